@@ -1,8 +1,8 @@
-//! What one decision costs: the ranking alone, an observation, and the whole of `Adaptive::decide` with its sampled estimate.
+//! What one decision costs: the ranking alone, and the whole of `Adaptive::decide` with its sampled estimate.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use sapwise::{
-    Adaptive, BroadPhase, Hardware, Load, Machine, Model, Observed, Pairs, Parameter, ParameterId, Registry, Tuning,
+    Adaptive, BroadPhase, Hardware, Load, Machine, Model, Pairs, Parameter, ParameterId, Registry, Tuning,
 };
 use sapwise_scenes::Scenario;
 use std::hint::black_box;
@@ -35,11 +35,6 @@ fn decision(c: &mut Criterion) {
             b.iter(|| tuning.rank(black_box(&load), |k| k < count));
         });
     }
-    let mut observed = Observed::new(tuning.costs.clone());
-    let ns = tuning.costs[0].curve.cost_ns(&load);
-    c.bench_function("observe one time", |b| {
-        b.iter(|| observed.observe(black_box(0), black_box(&load), black_box(1.1 * ns), 0.1));
-    });
     for objects in [100, 10_000, 1_000_000] {
         let scene = Scenario::Uniform.start(objects, 1);
         let mut adaptive = Adaptive::new(tuning.clone(), &registry).expect("available");

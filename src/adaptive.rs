@@ -124,7 +124,6 @@ impl Adaptive {
             model: tuning.model.clone(),
             extrapolated: tuning.extrapolated,
             warnings: tuning.warnings.clone(),
-            samples: tuning.samples.clone(),
             ..learned
         }
     }

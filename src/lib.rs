@@ -103,7 +103,7 @@ pub use pairs::{PairOrder, Pairs};
 #[cfg(feature = "parallel")]
 pub use rayon as rayon1;
 pub use registry::{AlgorithmSource, Registry, usable_cores};
-pub use tuning::{AlgorithmCost, Crossover, Observation, Observed, Ranking, Source, Step, Tuning, TuningError};
+pub use tuning::{AlgorithmCost, Crossover, Ranking, Source, Step, Tuning, TuningError};
 
 /// The example of the README as a test.
 #[cfg(all(doctest, feature = "this-machine"))]

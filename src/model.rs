@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 pub use error::{ModelError, PredictError};
 pub use helpers::{HelpersModel, ThreadFigures};
-pub use predict::{ASK, Prediction};
+pub use predict::Prediction;
 pub use scale::Scale;
 
 /// Prefix of a GPU's parameter in a [`Range`]: `gpu/upload_rate_gb_per_s`.

@@ -1,6 +1,7 @@
 //! Tunings: the cheapest algorithm for each load (the paper's fields of optimal performance).
 
 pub(crate) mod belief;
+mod corrected;
 mod crossover;
 mod error;
 #[cfg(feature = "model")]
@@ -13,7 +14,7 @@ use crate::{AlgorithmId, CostCurve, Load, Registry, Residual};
 use slice::Slice;
 use std::sync::Arc;
 
-pub use belief::{Observed, Slope};
+pub use corrected::corrected;
 pub use crossover::Crossover;
 pub use error::TuningError;
 
@@ -57,8 +58,6 @@ pub struct Tuning {
     pub interval_basis: String,
     /// The cost of each algorithm. Empty: `steps` decide.
     pub costs: Vec<AlgorithmCost>,
-    /// The samples by which a prediction was corrected before the first frame, in the order in which they were taken.
-    pub samples: Vec<Observation>,
 }
 
 named! {
@@ -72,7 +71,7 @@ named! {
         Predicted = "predicted",
         /// From timings of the algorithms on this machine.
         Measured = "measured",
-        /// Predicted, then corrected: by samples before the first frame ([`Tuning::samples`]), or by frames.
+        /// Predicted, then corrected by frames that ran in a program.
         Learned = "learned",
     }
 }
@@ -100,22 +99,6 @@ pub struct AlgorithmCost {
     pub curve: CostCurve,
     /// Standard deviation of the natural logarithm of measured over modelled time.
     pub spread_ln: f64,
-}
-
-/// One algorithm, timed on some frames of the tuning's scenario.
-#[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
-#[non_exhaustive]
-pub struct Observation {
-    /// The algorithm.
-    pub algorithm: AlgorithmId,
-    /// Number of objects.
-    pub objects: u32,
-    /// Prediction of the model, without any sample.
-    pub predicted_ns: f64,
-    /// Median over the frames.
-    pub measured_ns: f64,
 }
 
 /// The two cheapest algorithms under a load.
@@ -148,14 +131,6 @@ impl AlgorithmCost {
     pub(crate) fn residuals(&self) -> impl Iterator<Item = &Residual> {
         let fallback = self.curve.work.fallback.iter().filter_map(|f| f.work.residual.as_ref());
         self.curve.work.residual.iter().chain(&self.curve.observed).chain(fallback)
-    }
-}
-
-impl Observation {
-    /// An algorithm at a number of objects, predicted and measured in nanoseconds.
-    #[must_use]
-    pub fn new(algorithm: AlgorithmId, objects: u32, predicted_ns: f64, measured_ns: f64) -> Self {
-        Self { algorithm, objects, predicted_ns, measured_ns }
     }
 }
 
@@ -230,7 +205,6 @@ impl Tuning {
             crossovers: Vec::new(),
             interval_basis: String::new(),
             costs: Vec::new(),
-            samples: Vec::new(),
         }
     }
 
@@ -288,10 +262,6 @@ impl Tuning {
         }
         if let Some(c) = self.crossovers.iter().find(|c| !c.is_sound()) {
             return Some(TuningError::Crossover { below: c.below.clone(), above: c.above.clone() });
-        }
-        let is_time = |ns: f64| ns.is_finite() && ns > 0.0;
-        if let Some(s) = self.samples.iter().find(|s| !is_time(s.predicted_ns) || !is_time(s.measured_ns)) {
-            return Some(TuningError::Sample { algorithm: s.algorithm.clone(), objects: s.objects });
         }
         let places = || self.costs.iter().flat_map(AlgorithmCost::residuals).map(|r| &r.places);
         for (k, cost) in self.costs.iter().enumerate() {

@@ -1,18 +1,22 @@
 #!/usr/bin/env bash
-# Measures what the adaptive choice is worth on this machine: its time over that of the best single algorithm and over an oracle's, with tuning that
-# was predicted, measured, or of another machine, and beside another program.
+# Measures the adaptive choice on this machine: its time over that of the best single algorithm and over an oracle's,
+# with a tuning that was predicted, measured, or measured on another machine, and beside another program.
 #
-#     tools/in-line.sh [DIR] [OTHER.json]
+#     tools/in-line.sh OTHER.json [DIR]
+#     tools/in-line.sh datasets/intel-xeon-2c/full.json
 #
-# Texts, traces and pictures go into DIR (`in-line` by default) with a table of all runs, `summary.txt`; a report that is there already is used again.
-# OTHER.json is the report of another machine, whose tuning is to be corrected; without it one is simulated. Nothing else should run
-# meanwhile; takes 10 to 16 minutes beside the report's three.
+# OTHER.json is the report of another host: its tuning is wrong here, and the runs show how it is corrected. Texts,
+# traces and pictures go into DIR (`in-line` by default) with a table of all runs, `summary.txt`; a report.json that is
+# there already is used again. Nothing else should run meanwhile; takes 10 to 16 minutes beside the report's three.
 set -euo pipefail
 
-folder=${1:-in-line}
+usage="usage: tools/in-line.sh OTHER.json [DIR]; OTHER.json is a report of another host, as in datasets/"
+[ $# -ge 1 ] || { echo "$usage" >&2; exit 2; }
+[ -r "$1" ] || { echo "in-line.sh: $1 can't be read; $usage" >&2; exit 1; }
+other=$(cd "$(dirname "$1")" && pwd)/$(basename "$1")
+folder=${2:-in-line}
 mkdir -p "$folder"
 folder=$(cd "$folder" && pwd)
-other=${2:+$(cd "$(dirname "$2")" && pwd)/$(basename "$2")}
 cd "$(dirname "$0")/.."
 
 [ -n "${SAPWISE:-}" ] || cargo build --quiet --release -p sapwise-cli
@@ -20,18 +24,16 @@ sapwise=${SAPWISE:-${CARGO_TARGET_DIR:-target}/release/sapwise}
 
 report=$folder/report.json
 [ -s "$report" ] || "$sapwise" probe --no-gpus --out "$report" >/dev/null
-if [ -z "$other" ]; then
-    other=$folder/other/simulated-core-i5-4200u-no-gpu.json
-    [ -s "$other" ] || "$sapwise" simulate --out "$folder/other" >/dev/null
-fi
 
 stream=$folder/rapier3d.npy
-[ -s "$stream" ] || cargo run --quiet --release -p sapwise-example-rapier3d -- --frames 900 --bodies 2000 --quiet --record "$stream"
+[ -s "$stream" ] \
+    || cargo run --quiet --release -p sapwise-example-rapier3d -- --frames 900 --bodies 2000 --quiet --record "$stream"
 [ -s "$folder/pooled.npy" ] || cargo run --quiet --release -p sapwise-scenes --example streams -- "$folder" >/dev/null
 
 summary=$folder/summary.txt
 printf '%-28s %6s  %8s  %8s  %s\n' run single regret windows 'worst frame' >"$summary"
-# One name, then the scene and what differs. With `--after` the row has the regrets and the worst frame of the frames behind that.
+# A name, then the scene and what differs. With `--after` the row has the regrets and the worst frame of the frames
+# after that one.
 run() {
     local name=$1 single regret windows worst
     shift
@@ -50,7 +52,7 @@ run() {
     printf '%-28s %6s  %6s %%  %6s %%  %s\n' "$name" "$single" "$regret" "$windows" "$worst" | tee -a "$summary"
 }
 
-predicted=(--samples 8)
+predicted=()
 measured=(--tuning "$report")
 for scenario in uniform fast clustered slab mixed resting brownian free-fall gravity; do
     run "$scenario" $scenario --objects 3000 --frames 600 "${predicted[@]}"
@@ -74,5 +76,7 @@ run fragmentation-shared fragmentation --frames 1500 "${measured[@]}" --co-runne
 run uniform-shared uniform --objects 5000 --frames 1200 "${measured[@]}" --co-runner 600 --after 900
 
 awk 'NR > 1 && $1 !~ /-(wrong|shared)$/ { sum += log($2); n++; if ($2 > most) { most = $2; name = $1 } }
-    END { printf "\n%d undisturbed runs over the best single algorithm: geometric mean %.3f, most %.3f in %s\n", n, exp(sum / n), most, name }' \
-    "$summary" | tee -a "$summary"
+    END {
+        printf "\n%d undisturbed runs over the best single algorithm: geometric mean %.3f, most %.3f in %s\n", \
+            n, exp(sum / n), most, name
+    }' "$summary" | tee -a "$summary"

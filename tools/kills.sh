@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Kills `study`, `predict`, `run`, `train` and `probe`, N times each at random moments (100 by default: 500 in all), and looks whether a file was
-# lost or is half-written: tests/kills.rs. Takes about three seconds a kill. As root it fills a small disk too; otherwise it says that it does not.
+# Kills `study`, `predict`, `run`, `train` and `probe` N times each at random moments (100 by default: 500 in all), and
+# checks that no file is lost or half-written: probes/tests/kills.rs. Takes about three seconds a kill. As root it also
+# fills a small disk; otherwise it says that it does not.
 #
 #   tools/kills.sh [N]
 set -euo pipefail

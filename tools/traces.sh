@@ -1,11 +1,12 @@
 #!/usr/bin/env bash
-# Records what every algorithm takes in each frame of some scenes on this machine: traces that a test replays through the adaptive choice, under a clock
-# that counts (src/adaptive/tests/traces.rs). `TRACES=DIR cargo test -p sapwise --features model traces -- --nocapture` replays others than those of
-# datasets/traces.
+# Records the time of every algorithm in each frame of some scenes on this machine. A test replays such traces through
+# the adaptive choice, with a counter as its clock (src/adaptive/tests/traces.rs): `TRACES=DIR cargo test -p sapwise
+# --features model traces -- --nocapture` replays those of DIR instead of datasets/traces.
 #
 #     tools/traces.sh DIR [SEED]
 #
-# Of what `sapwise run --trace` writes the numbers of objects and pairs and the times are kept. Nothing else should run meanwhile; takes half a minute.
+# Keeps the numbers of objects and pairs and the times of what `sapwise run --trace` writes. Nothing else should run
+# meanwhile; takes half a minute.
 set -euo pipefail
 folder=${1:?usage: tools/traces.sh DIR [SEED]}
 seed=${2:-1}
@@ -17,13 +18,14 @@ cd "$(dirname "$0")/.."
 sapwise=${SAPWISE:-${CARGO_TARGET_DIR:-target}/release/sapwise}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-"$sapwise" predict --samples 8 --no-gpus --out "$work/tuning.json" >/dev/null
+"$sapwise" predict --no-gpus --out "$work/tuning.json" >/dev/null
 
-# The scenario, its objects, what else is in the name, and further options.
+# record SCENARIO OBJECTS SUFFIX OPTION...: one trace, named after the first three.
 record() {
     local scenario=$1 objects=$2 more=$3
     shift 3
-    "$sapwise" run "$scenario" --objects "$objects" "$@" --seed "$seed" --repeats 1 --no-gpus --tuning "$work/tuning.json" --trace "$work/trace.csv" >/dev/null
+    "$sapwise" run "$scenario" --objects "$objects" "$@" --seed "$seed" --repeats 1 --no-gpus --tuning "$work/tuning.json" \
+        --trace "$work/trace.csv" >/dev/null
     awk -F, 'NR == 1 { for (k = 1; k <= NF; k++) if ($k ~ /@|^objects$|^pairs$/) kept[++n] = k }
         {
             for (k = 1; k <= n; k++) {

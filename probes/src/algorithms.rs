@@ -1,31 +1,32 @@
-//! The algorithms of the command: ours, and those that a user's program adds.
+//! The algorithms of the command: those of the library, and those that a user's program adds.
 
 use crate::revisions;
 use sapwise::model::Scale;
 use sapwise::{AlgorithmId, Backend, BackendClass, BroadPhase, Error, Registry, Term};
 use std::sync::Arc;
 
-/// Creates an instance of a user's algorithm on that many threads.
+/// Creates an instance of a user's algorithm on a number of threads.
 type Factory = Arc<dyn Fn(u32) -> Result<Box<dyn BroadPhase>, Error> + Send + Sync>;
 
 /// An algorithm that a user's program adds to the command.
 ///
-/// `method` is 1 to 32 of `a-z`, `0-9`, `-` and `_`, beginning with a letter, and no name of ours. Count `revision` up whenever its speed
-/// changes: reports and models of other revisions are stale then. The factory is called in each process that runs the algorithm, and its error
-/// leaves the algorithm out with a remark. One with kernels of several vector widths asks
-/// [`SimdLevel::in_use`](sapwise::SimdLevel::in_use), so that a probe with `SAPWISE_SIMD` restricts it as well.
+/// `method` is 1 to 32 of `a-z`, `0-9`, `-` and `_`, begins with a letter, and is no name of the library's. Increase
+/// `revision` whenever the speed changes: reports and models of other revisions are stale then. Each process that runs
+/// the algorithm calls the factory; an error leaves the algorithm out with a remark. An algorithm with kernels of
+/// several vector widths should ask [`SimdLevel::in_use`](sapwise::SimdLevel::in_use), so that `SAPWISE_SIMD` restricts
+/// it too.
 #[derive(Clone)]
 pub struct UserAlgorithm {
     method: String,
     revision: u32,
-    /// Whether it runs on the thread counts that ours run on, or on one thread only.
+    /// Whether it runs on the thread counts of the library's algorithms, or on one thread only.
     parallel: bool,
     terms: Vec<(Term, Scale)>,
     factory: Factory,
 }
 
 impl UserAlgorithm {
-    /// An algorithm that runs on the calling thread alone, as `method@cpu1`.
+    /// Creates an algorithm that runs on the calling thread alone, as `method@cpu1`.
     #[must_use]
     pub fn on_one_thread(
         method: &str,
@@ -35,9 +36,9 @@ impl UserAlgorithm {
         Self::new(method, revision, false, Arc::new(move |_| factory()))
     }
 
-    /// An algorithm that runs on several threads: the factory is called with their number, the calling one included. It is listed, as ours
-    /// are, on 1, 2, 4, ... threads and on all that the machine has or `--threads` allows. The command pins our threads to cores; those of a
-    /// user's algorithm it leaves alone.
+    /// Creates an algorithm that runs on several threads. The factory gets their number, the calling thread included:
+    /// 1, 2, 4, ... and all that the machine has or `--threads` allows. The command pins the library's threads to
+    /// cores, not those of a user's algorithm.
     #[must_use]
     pub fn on_threads(
         method: &str,
@@ -51,10 +52,10 @@ impl UserAlgorithm {
         Self { method: method.to_owned(), revision, parallel, terms: Vec::new(), factory }
     }
 
-    /// What the time of a frame grows with, and what of the hardware it takes: `train` fits a unit for each of these terms to the timings.
-    /// Without them the terms are used that fit most methods: calls, objects, sorting, all pairs, candidates on an axis and pairs.
+    /// Sets what the time of a frame grows with and which hardware parameter each term depends on; `train` fits a unit
+    /// for each. Without this the terms are calls, objects, sorting, all pairs, candidates on an axis and pairs.
     ///
-    /// `probes/examples/own_algorithm.rs` says that a sort takes `log2 n` steps for each object.
+    /// `probes/examples/own_algorithm.rs` declares a sort of `log2 n` steps for each object.
     #[must_use]
     pub fn terms(mut self, terms: &[(Term, Scale)]) -> Self {
         self.terms = terms.to_vec();
@@ -62,11 +63,10 @@ impl UserAlgorithm {
     }
 }
 
-/// What a registry of the command holds beside the algorithms on GPUs.
+/// The algorithms on the CPU that the command knows.
 ///
-/// It is handed from the start of the command to every verb that runs algorithms or names them, and is the one place where they make
-/// a [`Registry`]: one made elsewhere would know nothing of the user's. It is no global, so that two tests of one process can have
-/// different ones.
+/// Every verb gets it from the start of the command, and makes each [`Registry`] with it: one made elsewhere would lack
+/// the user's. It is no global, so that two tests of one process can have different ones.
 #[derive(Default)]
 pub(crate) struct Algorithms {
     users: Vec<UserAlgorithm>,
@@ -80,7 +80,7 @@ impl Algorithms {
     pub(crate) fn add(&mut self, algorithm: UserAlgorithm) -> Result<(), String> {
         let method = &algorithm.method;
         AlgorithmId::new(method, Backend::Cpu(1)).map_err(|e| e.to_string())?;
-        // Timings and models are told apart by the name, so a second algorithm under it would pass for the first.
+        // Timings and models know an algorithm by its name only.
         let ours = Registry::with_cores(1);
         if [BackendClass::Cpu, BackendClass::Gpu].iter().any(|&class| revisions::is_known((class, method), &ours)) {
             return Err(format!("{method:?} is the name of a method of Sapwise; give your algorithm another name"));
@@ -92,18 +92,18 @@ impl Algorithms {
         Ok(())
     }
 
-    /// The terms that a user said the cost of a method has. None for ours, and where the user said nothing.
+    /// Returns the terms that a user declared for a method; none for the library's.
     pub(crate) fn terms(&self, id: &AlgorithmId) -> &[(Term, Scale)] {
         let own = self.users.iter().find(|u| u.method == id.method() && id.backend().class() == BackendClass::Cpu);
         own.map_or(&[], |u| &u.terms)
     }
 
-    /// The methods of the user, each with its revision.
+    /// Returns the methods of the user, each with its revision.
     pub(crate) fn users(&self) -> impl Iterator<Item = (&str, u32)> {
         self.users.iter().map(|u| (u.method.as_str(), u.revision))
     }
 
-    /// Ours on 1, 2, 4, ... and `cores` threads, then the user's.
+    /// Makes a registry with the library's algorithms on 1, 2, 4, ... and `cores` threads, then the user's.
     pub(crate) fn registry(&self, cores: u32) -> Registry {
         let mut registry = Registry::with_cores(cores);
         let mut counts: Vec<u32> = registry.available().iter().map(|e| e.id.threads()).collect();

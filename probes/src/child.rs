@@ -2,8 +2,8 @@
 
 use crate::interrupt;
 use anyhow::Context;
-use std::io::{BufRead, BufReader, Read, Write};
-use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
+use std::io::{BufRead, BufReader, Read};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -101,84 +101,6 @@ fn run(
     let status = child.0.wait().context("a part of the measurement got lost")?;
     let complaint = complaints.and_then(|c| c.join().ok()).unwrap_or_default();
     Ok(judge(status, &complaint))
-}
-
-/// A part that is told what to do line by line.
-pub(crate) struct Dialogue {
-    child: EndedOnDrop,
-    requests: ChildStdin,
-    lines: Receiver<String>,
-    complaints: Option<JoinHandle<String>>,
-}
-
-impl Dialogue {
-    /// Starts `sapwise part ARGUMENTS`, which must end when its standard input does ([`requests`]).
-    ///
-    /// # Errors
-    /// When the process can't be started.
-    pub(crate) fn begin(arguments: &[&str]) -> anyhow::Result<Self> {
-        let mut command = own_program()?;
-        command.arg("part").args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        let mut child =
-            EndedOnDrop(command.spawn().context("a part of the measurement can't be started as a process")?);
-        let requests = child.0.stdin.take().context("a part of the measurement has no standard input")?;
-        let answers = child.0.stdout.take().context("a part of the measurement has no standard output")?;
-        let complaints = child.0.stderr.take().map(last_line);
-        Ok(Self { child, requests, lines: lines(answers), complaints })
-    }
-
-    /// Sends a line. One that can't be sent is not missed: [`Self::listen`] then says how the process ended.
-    pub(crate) fn tell(&mut self, request: &str) {
-        let _ = writeln!(self.requests, "{request}");
-    }
-
-    /// Waits for a line that `read` understands, for `limit` at most; others are passed over. Without any it says how the process
-    /// ended, and `self` is of no more use.
-    ///
-    /// # Errors
-    /// When the process got lost.
-    pub(crate) fn listen<T>(
-        &mut self,
-        limit: Duration,
-        read: impl Fn(&str) -> Option<T>,
-    ) -> anyhow::Result<Result<T, Ended>> {
-        let end = Instant::now() + limit;
-        loop {
-            let left = end.saturating_duration_since(Instant::now());
-            match self.lines.recv_timeout(left.min(POLL)) {
-                Ok(line) => {
-                    if let Some(answer) = read(&line) {
-                        return Ok(Ok(answer));
-                    }
-                }
-                Err(RecvTimeoutError::Disconnected) => {
-                    let status = self.child.0.wait().context("a part of the measurement got lost")?;
-                    let complaint = self.complaints.take().and_then(|c| c.join().ok()).unwrap_or_default();
-                    return Ok(Err(judge(status, &complaint)));
-                }
-                Err(RecvTimeoutError::Timeout) if left.is_zero() => {
-                    return Ok(Err(Ended::Badly("was stopped because its time was over".to_owned())));
-                }
-                Err(RecvTimeoutError::Timeout) => {}
-            }
-            if interrupt::requested() {
-                return Ok(Err(Ended::Interrupted));
-            }
-        }
-    }
-}
-
-/// The lines of standard input as they come, for parts that are told what to do. Ends this process when the pipe of the process
-/// that started it closes, whatever it is doing.
-pub(crate) fn requests() -> Receiver<String> {
-    let (sender, receiver) = channel();
-    std::thread::spawn(move || {
-        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
-            let _ = sender.send(line);
-        }
-        std::process::exit(1);
-    });
-    receiver
 }
 
 /// Asks this process to stop, as Ctrl-C does, when the pipe of the process that started it closes.

@@ -9,27 +9,27 @@ use std::process::ExitCode;
 
 pub use crate::algorithms::UserAlgorithm;
 
-/// The command `sapwise`, with algorithms of the user's own beside ours.
+/// The command `sapwise`, with the user's own algorithms beside the library's.
 ///
-/// Each of them is timed, verified, fitted, predicted and run like ours, by every verb. Verbs run parts of a measurement in
-/// processes of their own, which are the same program with other arguments: the program must reach [`run`](Self::run) with the same
+/// Every verb times, verifies, fits, predicts and runs them like the library's. Verbs start parts of a measurement as
+/// processes of the same program with other arguments: the program must reach [`run`](Self::run) with the same
 /// algorithms however it is started, and print nothing before.
 #[derive(Default)]
 pub struct Command {
     algorithms: Algorithms,
-    /// Why the first algorithm that can't be added was refused.
+    /// Why an algorithm was refused, if one was.
     refused: Option<String>,
 }
 
 impl Command {
-    /// The command with our algorithms.
+    /// Creates the command with the library's algorithms.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Adds an algorithm. Where its name is no method name, is that of a method of ours, or was added before, [`run`](Self::run) says so and
-    /// fails.
+    /// Adds an algorithm. [`run`](Self::run) fails if its name is no method name, belongs to the library, or was added
+    /// before.
     #[must_use]
     pub fn with(mut self, algorithm: UserAlgorithm) -> Self {
         let refused = self.algorithms.add(algorithm).err();
@@ -37,17 +37,17 @@ impl Command {
         self
     }
 
-    /// Reads the arguments of this process, does what they ask, and returns the exit status for `main` to return: 0 done, 1 failed,
-    /// 2 wrong usage, 128 plus its number where a signal asked to stop. Ends the process itself where the arguments can't be read.
+    /// Runs the arguments of this process and returns the exit status for `main`: 0 done, 1 failed, 2 wrong usage, 128
+    /// plus the number of a signal that asked to stop. Ends the process itself if the arguments can't be read.
     #[must_use]
     pub fn run(self) -> ExitCode {
-        // Before the arguments are looked at: whoever wrote the program should see it, whatever they ask for.
+        // Whatever the arguments ask for: whoever wrote the program should see it.
         if let Some(why) = self.refused {
             return exit::report(Err(anyhow::anyhow!("{why}")));
         }
         match Arguments::try_parse() {
             Ok(arguments) => exit::report(verbs::run(arguments.verb, &self.algorithms)),
-            // Help and the version were asked for, and are lost where standard output takes nothing.
+            // Help or the version, which fail if standard output takes nothing.
             Err(help) if !help.use_stderr() => {
                 exit::report(help.print().map_err(output::refused).map(|()| Outcome::Done))
             }

@@ -2,22 +2,21 @@
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// Today as `yyyy-mm-dd`. With a clock before 1970 it is 1970-01-01.
+/// Returns today as `yyyy-mm-dd`, and 1970-01-01 for an earlier clock.
 pub(crate) fn today() -> String {
     let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
     civil(seconds / 86_400)
 }
 
-/// The date that many days after 1970-01-01 in the Gregorian calendar.
-///
-/// Years are counted from 1 March, so that the leap day is the last of its year.
+/// Returns the Gregorian date a number of days after 1970-01-01. Years are counted from 1 March, so that the leap day
+/// is the last of its year.
 fn civil(days: u64) -> String {
     // 719 468 days lie between 0000-03-01 and 1970-01-01; 146 097 days are 400 years.
     let days = days + 719_468;
     let (era, day_of_era) = (days / 146_097, days % 146_097);
     let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
     let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    // Months from March have 31, 30, 31, 30, 31 days over and over: 153 days in five months.
+    // From March on, months have 31, 30, 31, 30 and 31 days again and again: 153 days in five months.
     let month_from_march = (5 * day_of_year + 2) / 153;
     let day = day_of_year - (153 * month_from_march + 2) / 5 + 1;
     let month = if month_from_march < 10 { month_from_march + 3 } else { month_from_march - 9 };
@@ -25,7 +24,7 @@ fn civil(days: u64) -> String {
     format!("{year:04}-{month:02}-{day:02}")
 }
 
-/// Whether a text is a day of the calendar, as `yyyy-mm-dd`.
+/// Returns whether a text is a day of the calendar, as `yyyy-mm-dd`.
 pub(crate) fn is_day(text: &str) -> bool {
     let parts: Vec<&str> = text.split('-').collect();
     let number = |part: &str, digits: usize| {

@@ -1,4 +1,4 @@
-//! Where a report goes, checked before the minutes of measuring, with a way out when it fails after them.
+//! Where a report goes: checked before the minutes of measuring, with a second place if writing fails after them.
 
 use crate::output;
 use crate::outputs::check_writable;
@@ -11,20 +11,20 @@ use std::path::{Path, PathBuf};
 /// Where the report goes without `--out`.
 const DEFAULT: &str = "report.json";
 
-/// What is added to the name of a report that is being measured.
+/// The extension of a report that is being measured.
 pub(crate) const UNFINISHED: &str = "unfinished";
 
 /// The file of a report.
 pub(crate) struct Destination {
     path: PathBuf,
-    /// Where the report is until it is finished: what stands under its name may be hours of measuring, and stays until then.
+    /// The file of the unfinished report: the one at `path` may hold hours of measuring, and stays until the end.
     unfinished: PathBuf,
-    /// Whether this program has written that.
+    /// Whether this program wrote the unfinished report.
     wrote_unfinished: Cell<bool>,
 }
 
 impl Destination {
-    /// The file that the user named, or the default, after a try whether its folder takes a file.
+    /// Takes the file that the user named, or the default, and tries whether its folder takes a file.
     ///
     /// # Errors
     /// When the folder takes none, or the path is a folder itself.
@@ -38,9 +38,9 @@ impl Destination {
         Ok(Self { path, unfinished, wrote_unfinished: Cell::new(false) })
     }
 
-    /// Writes the report as it is by now beside its place, so that even a power cut costs one scenario only.
+    /// Writes the report as it is now to the unfinished file, so that a power cut costs one scenario.
     pub(crate) fn save_unfinished(&self, report: &Report) {
-        // Into a pipe or a device goes one report.
+        // A pipe or a device takes one report, the last.
         if self.path.exists() && !self.path.is_file() {
             return;
         }
@@ -50,7 +50,8 @@ impl Destination {
         }
     }
 
-    /// Writes the report of a measurement that was interrupted. What stands under its name already may be hours of measuring, and stays: then it goes beside it.
+    /// Writes the report of an interrupted measurement: to the unfinished file if there is a report already, which
+    /// stays.
     ///
     /// # Errors
     /// As [`save`](Self::save).
@@ -62,14 +63,14 @@ impl Destination {
         Ok(&self.unfinished)
     }
 
-    /// Writes the finished report, in the folder for temporary files when its own path fails.
+    /// Writes the finished report, to the folder for temporary files if its own path fails.
     ///
     /// # Errors
-    /// When it is not where it was wanted. The message says where it is.
+    /// When its own path fails. The message says where the report is.
     pub(crate) fn save(&self, report: &Report) -> anyhow::Result<&Path> {
         let Err(error) = write(&self.path, report) else {
             if self.wrote_unfinished.get() && self.unfinished != self.path {
-                // Whoever can't remove it has the whole report all the same.
+                // If this fails the whole report is written all the same.
                 let _ = fs::remove_file(&self.unfinished);
             }
             return Ok(&self.path);

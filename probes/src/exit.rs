@@ -1,18 +1,18 @@
-//! Exit statuses: 0 done, 1 failed, 2 wrong usage, 128 plus the number of a signal where that asked the program to stop.
+//! Exit statuses: 0 done, 1 failed, 2 wrong usage, 128 plus the number of a signal that asked the program to stop.
 
 use std::fmt;
 use std::process::ExitCode;
 
-/// How a verb ended that printed all it had to say.
+/// How a verb ended that has printed its answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Outcome {
     /// Exit status 0.
     Done,
-    /// Exit status 1, or that of a signal. What failed stands in the output already.
+    /// Exit status 1, or that of a signal. The output says what failed.
     Failed,
 }
 
-/// The command line or the environment asks for something that can't be. Exit status 2.
+/// A command line or an environment that can't be followed. Exit status 2.
 #[derive(Debug)]
 pub(crate) struct WrongUsage(pub(crate) String);
 
@@ -24,7 +24,7 @@ impl fmt::Display for WrongUsage {
 
 impl std::error::Error for WrongUsage {}
 
-/// Prints the error, if there is one, and turns the result into an exit status.
+/// Prints the error, if there is one, and returns the exit status.
 pub(crate) fn report(result: anyhow::Result<Outcome>) -> ExitCode {
     match result {
         Ok(Outcome::Done) => ExitCode::SUCCESS,

@@ -1,4 +1,5 @@
-//! The command `sapwise` as a library, so that a program of a few lines is the whole command with algorithms of its own.
+//! The command `sapwise` as a library, so that a program of a few lines is the whole command with algorithms of its
+//! own.
 //!
 //! ```no_run
 //! use sapwise::{Aabb, BroadPhase, Error, Pairs};
@@ -50,7 +51,6 @@ mod provenance;
 mod replay;
 mod restriction;
 mod revisions;
-mod samples;
 mod shell;
 mod summary;
 mod sweep;

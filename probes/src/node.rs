@@ -1,23 +1,24 @@
-//! Which node of a fleet this is, without its name.
+//! The file name of this node's report, which holds a hash instead of the host's name.
 
 use crate::profiles::machine_stem;
 use sapwise::{measure, usable_cores};
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
-/// Tells nodes apart where neither the host name nor the machine's id does: containers of one image, or two nodes that share a machine.
+/// The variable that names a node whose host name and machine id are not its own: containers of one image, or two nodes
+/// on one machine.
 const VARIABLE: &str = "SAPWISE_NODE";
 
 /// The id that Linux gives an installation.
 const MACHINE_ID: &str = "/etc/machine-id";
 
-/// Where the report of this node goes within a folder: `amd-epyc-2c-5f0c9a1b2d3e.json`, of CPU, cores and node.
+/// Returns the file for the report of this node within a folder: `amd-epyc-2c-5f0c9a1b2d3e.json`, made of CPU, cores
+/// and node.
 pub(crate) fn report_in(folder: &Path) -> PathBuf {
     folder.join(format!("{}-{}.json", machine_stem(&measure::machine().cpu, usable_cores()), node()))
 }
 
-/// 12 hex digits, the same whenever this node is asked. From a hash nobody reads the name of a host; of a thousand nodes two have the same once
-/// in half a billion fleets.
+/// Returns the 12 hex digits of this node. Two of a thousand nodes share theirs once in half a billion fleets.
 fn node() -> String {
     let given = std::env::var(VARIABLE).ok().filter(|text| !text.is_empty());
     digits(&given.unwrap_or_else(|| {

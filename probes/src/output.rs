@@ -3,7 +3,7 @@
 use std::fmt;
 use std::io::{ErrorKind, Write};
 
-/// Standard output is closed. A broken pipe elsewhere, such as one given to `--out`, is an error like any other.
+/// Standard output is closed. A broken pipe elsewhere, such as one given to `--out`, is an ordinary error.
 #[derive(Debug)]
 struct Closed;
 
@@ -25,7 +25,7 @@ pub(crate) fn print(text: &str) -> anyhow::Result<()> {
     written.and_then(|()| out.flush()).map_err(refused)
 }
 
-/// Why standard output was not written, for [`is_closed`].
+/// Returns the error for a standard output that was not written, which [`is_closed`] may recognise.
 pub(crate) fn refused(error: std::io::Error) -> anyhow::Error {
     if error.kind() == ErrorKind::BrokenPipe {
         return Closed.into();
@@ -41,7 +41,7 @@ pub(crate) fn print_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
     print(&serde_json::to_string(value)?)
 }
 
-/// Writes the text of a file of ours as one line of JSON to standard output.
+/// Writes the JSON text of a file as one line to standard output.
 ///
 /// # Errors
 /// As [`print()`].
@@ -49,17 +49,17 @@ pub(crate) fn print_file(text: &str) -> anyhow::Result<()> {
     print_json(&serde_json::from_str::<serde_json::Value>(text)?)
 }
 
-/// Writes a line to standard error. A closed standard error leaves nobody to tell, so that failure is dropped.
+/// Writes a line to standard error, and ignores a closed one.
 pub(crate) fn complain(text: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{text}");
 }
 
-/// Warns on standard error.
+/// Writes a warning to standard error.
 pub(crate) fn warn(text: &str) {
     complain(&format!("warning: {text}"));
 }
 
-/// Whether a reader such as `head` has closed standard output: it has what it wanted, so this is no failure.
+/// Returns whether a reader such as `head` has closed standard output, which is no failure.
 pub(crate) fn is_closed(error: &anyhow::Error) -> bool {
     error.is::<Closed>()
 }

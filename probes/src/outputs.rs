@@ -2,10 +2,10 @@
 
 use crate::exit::WrongUsage;
 use anyhow::{Context, bail};
-use sapwise_lab::figures::Picture;
 use std::path::{Path, PathBuf};
 
-/// What is to be known of the files that a verb writes before it works for minutes: none is read, none is named twice, and each can be written.
+/// Checks the output files of a verb before it works for minutes: none is an input, none is named twice, and each can
+/// be written.
 ///
 /// # Errors
 /// As [`refuse_overwriting`] and [`check_writable`].
@@ -14,7 +14,7 @@ pub(crate) fn check(inputs: &[PathBuf], outputs: &[&PathBuf]) -> anyhow::Result<
     outputs.iter().try_for_each(|path| check_writable(path))
 }
 
-/// Refuses to write over a file that is read, or twice into one file.
+/// Refuses to write over an input, or twice into one file.
 ///
 /// # Errors
 /// [`WrongUsage`] that names the file.
@@ -33,8 +33,7 @@ pub(crate) fn refuse_overwriting(inputs: &[PathBuf], outputs: &[&PathBuf]) -> Re
     Ok(())
 }
 
-/// Tries whether a file can be written: whether its folder takes one. What isn't a regular file, such as a device or a pipe, is written as
-/// it is, whatever its folder takes.
+/// Tries whether a file can be written, by a temporary file in its folder. A device or a pipe is not tried.
 ///
 /// # Errors
 /// Names the path and what to do.
@@ -60,22 +59,25 @@ pub(crate) fn check_writable(path: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Makes a folder for several files, where it is missing.
+/// Creates a folder for several files if it is missing.
 ///
 /// # Errors
 /// Names the folder and what to do.
 pub(crate) fn make_folder(folder: &Path) -> anyhow::Result<()> {
     if folder.exists() && !folder.is_dir() {
-        bail!("{} is a file; name a folder, which is made where it is missing", folder.display());
+        bail!("{} is a file; name a folder, which is created if it is missing", folder.display());
     }
     std::fs::create_dir_all(folder)
         .with_context(|| format!("the folder {} can't be made; name another", folder.display()))
 }
 
-/// The format that the name of a picture asks for.
+/// Refuses a picture that is no SVG by its name.
 ///
 /// # Errors
-/// When it ends in neither `.svg` nor `.png`.
-pub(crate) fn picture_format(path: &Path) -> Result<Picture, WrongUsage> {
-    Picture::of(path).map_err(|why| WrongUsage(format!("--plot {}: {why}", path.display())))
+/// [`WrongUsage`] that names the file.
+pub(crate) fn check_picture(path: &Path) -> Result<(), WrongUsage> {
+    match path.extension() {
+        Some(ending) if ending == "svg" => Ok(()),
+        _ => Err(WrongUsage(format!("--plot {}: name a file that ends in .svg", path.display()))),
+    }
 }

@@ -1,36 +1,35 @@
-//! Tuning of a machine from its hardware parameters.
+//! The tuning of a machine from its hardware parameters, or from its report.
 
 use crate::algorithms::Algorithms;
+use crate::args::Predict;
+use crate::check::doubts;
 use crate::progress::Progress;
-use crate::samples::{Live, Session};
 use crate::{interrupt, output, revisions};
 use anyhow::bail;
 use sapwise::hardware::ParameterId;
-use sapwise::model::{ASK, Prediction};
-use sapwise::stats::median;
-use sapwise::{GpuIdentity, Hardware, Load, Model, Observed, Registry, Source, Tuning};
+use sapwise::{GpuIdentity, Hardware, Load, Model, Registry, Tuning, usable_cores};
 use sapwise_lab::StoredModel;
-use sapwise_lab::belief::{Taken, learn};
-use sapwise_lab::data::{Document, read_document};
+use sapwise_lab::data::{Document, read_document, usual_scenario};
+use sapwise_lab::fit::measured_tuning;
+use sapwise_lab::report::Report;
 use sapwise_lab::sweep::loads;
-use sapwise_lab::text::count;
 use sapwise_scenes::Scenario;
 use std::path::Path;
 
-/// Objects of the slice that the tuning shows: four sizes a decade from ten to a million.
+/// Sizes of the slice that the tuning shows, in quarters of a decade: from ten objects to a million.
 const SLICE: std::ops::RangeInclusive<u32> = 4..=24;
 
-/// The number of objects at so many quarters of a decade.
+/// Returns the number of objects at a quarter of a decade.
 fn size(quarter: u32) -> u32 {
     10.0_f64.powf(f64::from(quarter) / 4.0).round() as u32
 }
 
-/// Whether an interval goes from the least to the most objects of the slice.
+/// Returns whether an interval spans the whole slice.
 pub(crate) fn is_whole_slice((low, high): (f64, f64)) -> bool {
     low <= f64::from(size(*SLICE.start())) && high >= f64::from(size(*SLICE.end()))
 }
 
-/// Seed of the scenes that the slice goes through.
+/// Seed of the scenes of the slice.
 const SEED: u64 = 1;
 
 /// The loads of a scenario over the number of objects.
@@ -38,15 +37,15 @@ pub(crate) struct Slice {
     scenario: Scenario,
     /// Ascending.
     pub(crate) loads: Vec<Load>,
-    /// Why there are no more of them.
+    /// Why the slice ends early, if it does.
     cut: Option<String>,
 }
 
 impl Slice {
-    /// The loads of a scenario, with the pairs that it really has, of as many objects as there is memory for.
+    /// Returns the loads of a scenario, with its real pairs, up to as many objects as fit into memory.
     ///
     /// # Errors
-    /// On Ctrl-C, and where there is no memory for any.
+    /// On Ctrl-C, and when no size fits into memory.
     pub(crate) fn of(scenario: Scenario) -> anyhow::Result<Self> {
         let sizes: Vec<u32> = SLICE.map(size).collect();
         let progress = Progress::new(sizes.iter().map(|&n| u64::from(n)).sum());
@@ -61,7 +60,7 @@ impl Slice {
         Self::as_far_as_known(scenario, known, found)
     }
 
-    /// Those that are known, where only memory for more was wanting.
+    /// Keeps the loads that are known if the only error was a lack of memory.
     fn as_far_as_known(scenario: Scenario, loads: Vec<Load>, found: anyhow::Result<()>) -> anyhow::Result<Self> {
         let cut = match (found, loads.last()) {
             (Ok(()), _) => None,
@@ -74,12 +73,7 @@ impl Slice {
     }
 }
 
-/// Puts a sentence in the place of the library's advice for a machine unlike those of training, where `predict --samples` is not what helps.
-pub(crate) fn advise(tuning: &mut Tuning, instead: &str) {
-    tuning.warnings.iter_mut().filter(|w| *w == ASK).for_each(|w| instead.clone_into(w));
-}
-
-/// The model in a file, or the one that is built in, with what training says of it.
+/// Reads the model of a file, or the built-in one, with its training.
 ///
 /// # Errors
 /// When the file is no sound model.
@@ -91,7 +85,7 @@ pub(crate) fn model(path: Option<&Path>) -> anyhow::Result<StoredModel> {
     }
 }
 
-/// Predicts the tuning of a machine: every algorithm on 1, 2, 4, ... and all of its cores, and on these of its GPUs.
+/// Predicts the tuning of a machine: every algorithm on 1, 2, 4, ... and all of its cores, and on some of its GPUs.
 ///
 /// # Errors
 /// When the model predicts none of the algorithms.
@@ -102,95 +96,62 @@ pub(crate) fn predict(
     slice: &Slice,
     algorithms: &Algorithms,
 ) -> anyhow::Result<Tuning> {
-    let registry = algorithms.registry(cores(hardware));
-    let mut tuning = prediction(model, hardware, gpus, &registry)?.tuning(&slice.scenario.to_string(), &slice.loads);
+    let cores = hardware.value(ParameterId::UsableCores).map_or(1, |k| k as u32);
+    let registry = algorithms.registry(cores);
+    let mut known = registry.available();
+    known.extend(sapwise::gpu::algorithms(gpus));
+    let prediction = model.predict(hardware, &known).map_err(anyhow::Error::msg)?;
+    let mut tuning = prediction.tuning(&slice.scenario.to_string(), &slice.loads);
     tuning.warnings.extend(unknown(algorithms, &registry, model));
     tuning.warnings.extend(slice.cut.clone());
     Ok(tuning)
 }
 
-/// Predicts the tuning of this machine and corrects it by up to `most` samples. Also returns whether an algorithm returned a wrong answer.
-///
-/// Whatever keeps samples from being taken, Ctrl-C too, is a warning: the prediction stays.
+/// Predicts the tuning of the machine of a report, or measures it from the timings of the report, with what is doubtful
+/// about either.
 ///
 /// # Errors
-/// As [`predict`], and when no process can be started.
-pub(crate) fn predict_and_sample(
+/// When the model predicts none of the algorithms, or the report has too few timings.
+pub(crate) fn of_report(
+    report: &Report,
+    arguments: &Predict,
     model: &Model,
-    hardware: &Hardware,
-    gpus: &[GpuIdentity],
-    slice: &Slice,
     algorithms: &Algorithms,
-    most: u32,
-) -> anyhow::Result<(Tuning, bool)> {
-    let registry = algorithms.registry(cores(hardware));
-    let mut prediction = prediction(model, hardware, gpus, &registry)?;
-    let Slice { scenario, loads, cut } = slice;
-    let session = Session {
-        scenario: scenario.to_string(),
-        seed: SEED,
-        cores: cores(hardware),
-        gpus: gpus.to_vec(),
-        algorithms: prediction.costs.iter().map(|c| c.algorithm.clone()).collect(),
+) -> anyhow::Result<Tuning> {
+    let mut tuning = if arguments.measured {
+        let mut report = report.clone();
+        arguments.gpus.restrict(&mut report);
+        let scenario = arguments.scenario.map(|s| s.to_string());
+        measured_tuning(&report, scenario.as_deref().unwrap_or_else(|| usual_scenario(&report)), Some(model))?
+    } else {
+        let gpus = report.hardware.gpus.iter().map(|g| g.gpu.clone());
+        let taken: Vec<_> = gpus.filter(|g| arguments.gpus.takes(g)).collect();
+        let slice = Slice::of(arguments.scenario.unwrap_or(Scenario::Uniform))?;
+        predict(model, &report.hardware, &taken, &slice, algorithms)?
     };
-    let disturbed: Vec<f64> = hardware.parameters.iter().filter_map(|p| p.foreign_load).collect();
-    let mut live = Live::new(session, median(&disturbed));
-    let costs = prediction.costs.clone();
-    let predicted = if prediction.extrapolated { Observed::of_unlike_machine(costs) } else { Observed::new(costs) };
-    let learned = learn(predicted, loads, &mut live, most as usize)?;
-    let (remarks, wrong) = live.remarks();
-    if !learned.usable.contains(&true) {
-        bail!("every algorithm failed: {}; --samples 0 predicts without samples", learned.remarks.join("; "));
+    // A prediction does not depend on the timings of the report.
+    if arguments.measured {
+        let stale = revisions::stale_in_report(report, &algorithms.registry(usable_cores()));
+        tuning.warnings.extend(stale.into_iter().map(|why| format!("the report is stale: {why}; probe again")));
     }
-    prediction.costs = learned.costs();
-    let mut tuning = prediction.tuning(&scenario.to_string(), loads);
-    tuning.warnings.extend(unknown(algorithms, &registry, model));
-    tuning.warnings.extend(cut.clone());
-    if !learned.taken.is_empty() {
-        tuning.source = Source::Learned;
-        tuning.samples = learned.taken.iter().map(Taken::observation).collect();
-        // What asked for samples has got them.
-        tuning.warnings.retain(|w| w != ASK);
-    }
-    tuning.warnings.extend(remarks);
-    tuning.warnings.extend(learned.remarks);
-    if interrupt::requested() {
-        let taken = count(learned.taken.len(), "sample");
-        tuning.warnings.push(format!("interrupted after {taken}: the prediction is corrected by those only"));
-    }
-    Ok((tuning, wrong))
+    tuning.warnings.extend(doubts(report).into_iter().map(|doubt| format!("the report is doubtful: {doubt}")));
+    Ok(tuning)
 }
 
-/// The methods of the model that this build lacks, and the user's methods that the model lacks.
+/// Returns warnings about methods of the model that this build lacks, and methods of the user that the model lacks.
 fn unknown(algorithms: &Algorithms, registry: &Registry, model: &Model) -> Vec<String> {
     let mut warnings = revisions::unknown_to(registry, model);
     for (method, _) in algorithms.users() {
         let id = format!("{method}@cpu1").parse();
         if id.is_ok_and(|id| model.method(&id).is_none()) {
             warnings.push(format!(
-                "{method} is not predicted: the model {} was trained on reports without it. Measure it with this program: `probe --out own.json`, \
-                 `train own.json --out own-model.json`, then `predict --model own-model.json`",
+                "{method} is not predicted: the model {} was trained on reports without it. Measure it with this program: \
+                 `probe --out own.json`, `train own.json --out own-model.json`, then `predict --model own-model.json`",
                 model.name
             ));
         }
     }
     warnings
-}
-
-fn cores(hardware: &Hardware) -> u32 {
-    hardware.value(ParameterId::UsableCores).map_or(1, |k| k as u32)
-}
-
-/// Costs of every algorithm of the registry and on these GPUs.
-fn prediction(
-    model: &Model,
-    hardware: &Hardware,
-    gpus: &[GpuIdentity],
-    registry: &Registry,
-) -> anyhow::Result<Prediction> {
-    let mut known = registry.available();
-    known.extend(sapwise::gpu::algorithms(gpus));
-    model.predict(hardware, &known).map_err(anyhow::Error::msg)
 }
 
 #[cfg(test)]
@@ -207,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slice_ends_where_memory_does_and_no_other_error_is_passed_over() {
+    fn a_slice_ends_with_the_memory_and_other_errors_are_returned() {
         let short =
             || Err(anyhow::Error::from(sapwise::Error::OutOfMemory { what: "boxes", elements: 9 }).context("at 90"));
         let known = vec![Load::of_objects(10), Load::of_objects(50)];
@@ -217,13 +178,5 @@ mod tests {
         assert!(Slice::as_far_as_known(Scenario::Uniform, known.clone(), Ok(())).unwrap().cut.is_none());
         assert!(Slice::as_far_as_known(Scenario::Uniform, Vec::new(), short()).is_err());
         assert!(Slice::as_far_as_known(Scenario::Uniform, known, Err(anyhow::anyhow!("interrupted"))).is_err());
-    }
-
-    #[test]
-    fn the_advice_of_the_library_is_replaced_and_no_other_warning() {
-        let mut tuning = Tuning::usual(&Registry::with_cores(1));
-        tuning.warnings = vec!["left out".to_owned(), ASK.to_owned()];
-        advise(&mut tuning, "measure it");
-        assert_eq!(tuning.warnings, ["left out", "measure it"]);
     }
 }

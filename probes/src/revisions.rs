@@ -1,29 +1,29 @@
-//! Whether what a file tells about algorithms holds for those of this build.
+//! Whether what a file says about algorithms holds for this build.
 
 use sapwise::{AlgorithmId, BackendClass, GpuIdentity, GpuKind, Model, Registry, Tuning};
 use sapwise_lab::Report;
 
-/// What keeps the timings of a report from holding for this build, one sentence for each method.
+/// Returns why the timings of a report do not hold for this build, one sentence for each method.
 pub(crate) fn stale_in_report(report: &Report, registry: &Registry) -> Vec<String> {
     stale(report.algorithms.iter().map(|t| (of(&t.id), t.revision)), registry)
 }
 
-/// The same of tuning. Those without costs hold no revisions.
+/// Returns why a tuning does not hold for this build. One without costs has no revisions.
 pub(crate) fn stale_in_tuning(tuning: &Tuning, registry: &Registry) -> Vec<String> {
     stale(tuning.costs.iter().map(|c| (of(&c.algorithm), c.revision)), registry)
 }
 
-/// What has a revision: a method on one class of processor.
+/// What a revision belongs to: a method on one class of processor.
 pub(crate) type Key<'a> = (BackendClass, &'a str);
 
 pub(crate) fn of(id: &AlgorithmId) -> Key<'_> {
     (id.backend().class(), id.method())
 }
 
-/// What is said after the name of a method that this build lacks.
+/// Follows the name of a method that this build lacks.
 const ELSEWHERE: &str = "is not in this build: it is of another version, or of a program that adds it";
 
-/// The methods of a model that this build lacks, one sentence for each.
+/// Returns the methods of a model that this build lacks, one sentence for each.
 pub(crate) fn unknown_to(registry: &Registry, model: &Model) -> Vec<String> {
     let keys = model.methods.iter().map(|m| (m.backend, m.method.as_str()));
     let unknown = keys.filter(|&key| !is_known(key, registry));
@@ -34,14 +34,14 @@ fn name((class, method): Key<'_>) -> String {
     if class == BackendClass::Cpu { method.to_owned() } else { format!("{method} on a GPU") }
 }
 
-/// The methods whose revision is not that of this build.
+/// Returns the methods whose revision is not that of this build, one sentence for each.
 pub(crate) fn stale<'a>(used: impl Iterator<Item = (Key<'a>, u32)>, registry: &Registry) -> Vec<String> {
-    // The revisions on GPUs are the same on every GPU, and hold on a machine without any.
+    // A revision on GPUs is the same on every GPU, and known without any.
     let on_gpus = sapwise::gpu::algorithms(std::iter::once(&any_gpu()));
     let mut stale = Vec::new();
     for ((class, method), revision) in used {
         let name = name((class, method));
-        // Every thread count of a method has the same revision, and a machine with other counts has other ids.
+        // A method has one revision on every number of threads.
         let own = registry.entries().iter().find(|e| of(&e.id) == (class, method)).map(|e| e.revision);
         let ours = own.or_else(|| on_gpus.iter().find(|e| of(&e.id) == (class, method)).map(|e| e.revision));
         match ours {
@@ -55,13 +55,13 @@ pub(crate) fn stale<'a>(used: impl Iterator<Item = (Key<'a>, u32)>, registry: &R
     stale
 }
 
-/// Whether this build has a method on that class of processor.
+/// Returns whether this build has a method on that class of processor.
 pub(crate) fn is_known(key: Key<'_>, registry: &Registry) -> bool {
     let on_gpus = sapwise::gpu::algorithms(std::iter::once(&any_gpu()));
     registry.entries().iter().any(|e| of(&e.id) == key) || on_gpus.iter().any(|e| of(&e.id) == key)
 }
 
-/// A GPU that there need not be.
+/// A GPU for asking which algorithms there are.
 fn any_gpu() -> GpuIdentity {
     GpuIdentity::new(0, "", GpuKind::Other)
 }

@@ -1,8 +1,8 @@
-//! Commands as a shell takes them: what stands behind "Next:" and below pictures.
+//! Commands as a shell reads them, for "Next:" and the captions of pictures.
 
 use std::path::Path;
 
-/// A word as a shell takes it.
+/// Quotes a word for a shell, if it needs to be.
 pub(crate) fn quoted(text: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_./+=,@%:".contains(c);
     if !text.is_empty() && text.chars().all(plain) {
@@ -12,12 +12,12 @@ pub(crate) fn quoted(text: &str) -> String {
     }
 }
 
-/// A path as a shell takes it.
+/// Quotes a path for a shell, if it needs to be.
 pub(crate) fn path(path: &Path) -> String {
     quoted(&path.display().to_string())
 }
 
-/// The command that this process was started with, and these words behind it.
+/// Returns the command that this process was started with, followed by these words.
 pub(crate) fn again(more: &[&str]) -> String {
     let own = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned());
     let words = own.chain(more.iter().map(|word| (*word).to_owned())).map(|word| quoted(&word));

@@ -1,4 +1,4 @@
-//! What a person reads at the end of a probe or a prediction.
+//! What people read at the end of a probe or a prediction.
 
 use crate::gpus::GpuChoice;
 use crate::prediction::is_whole_slice;
@@ -10,10 +10,10 @@ use sapwise_lab::data::usual_scenario;
 use sapwise_lab::fit::measured_tuning;
 use sapwise_lab::label_text;
 use sapwise_lab::report::{Label, Report};
-use sapwise_lab::text::{columns, count, duration, grouped};
+use sapwise_lab::text::{columns, count, grouped};
 use std::path::Path;
 
-/// The hardware, then the tuning of every scenario that was swept.
+/// Describes the hardware, then the tuning of every scenario of the sweep.
 pub(crate) fn report(report: &Report, terminal: Terminal) -> String {
     let mut text = hardware(&report.hardware, terminal);
     let base = Model::built_in().ok();
@@ -36,10 +36,10 @@ pub(crate) fn report(report: &Report, terminal: Terminal) -> String {
     text
 }
 
-/// What to do with a report that was written.
+/// Returns what to do with a written report.
 pub(crate) fn next_step(report: &Report, path: &Path) -> String {
     let path = shell::path(path);
-    // A report without a sweep, or one that was interrupted early, serves for its hardware only.
+    // A report without a sweep, or one that was interrupted early, holds little but the hardware.
     let next = if measured_tuning(report, usual_scenario(report), None).is_ok() {
         format!("sapwise run fragmentation --tuning {path}")
     } else {
@@ -48,7 +48,7 @@ pub(crate) fn next_step(report: &Report, path: &Path) -> String {
     format!("\nThe report is in {path}.\nNext: {next}")
 }
 
-/// The parameters of a machine, of each of its GPUs and of their groups, as tables.
+/// Describes the parameters of a machine, of each of its GPUs and of groups of GPUs, as tables.
 pub(crate) fn hardware(hardware: &Hardware, terminal: Terminal) -> String {
     let machine = &hardware.machine;
     let mut text = format!(
@@ -69,8 +69,7 @@ pub(crate) fn hardware(hardware: &Hardware, terminal: Terminal) -> String {
     text
 }
 
-/// A sentence on GPUs after a measurement, if there is need for one: that none was found, or which were not used. Failures are among the
-/// remarks.
+/// Returns a sentence if no GPU was found or some were not used. Failures are among the remarks.
 pub(crate) fn gpus_left_out(
     choice: &GpuChoice,
     hardware: &Hardware,
@@ -82,7 +81,7 @@ pub(crate) fn gpus_left_out(
         .or_else(|| choice.tell(left_out))
 }
 
-/// Parameters as a table. Those that are missing for the same reason share a row.
+/// Describes parameters as a table. Those that are missing for the same reason share a row.
 fn parameters(parameters: &[Parameter], terminal: Terminal) -> String {
     let mut rows = vec![["parameter", "value", "spread", "how"].map(str::to_owned).to_vec()];
     let missing = |p: &Parameter| p.how == How::Missing;
@@ -111,7 +110,7 @@ fn parameters(parameters: &[Parameter], terminal: Terminal) -> String {
     terminal.table(&rows)
 }
 
-/// The steps of a slice, with where each begins and how sure that is.
+/// Describes the steps of a slice, with where each begins and the interval of that.
 pub(crate) fn tuning(tuning: &Tuning, terminal: Terminal) -> String {
     let mut rows = Vec::new();
     for step in &tuning.steps {
@@ -135,23 +134,10 @@ pub(crate) fn tuning(tuning: &Tuning, terminal: Terminal) -> String {
     if !tuning.crossovers.iter().all(told) {
         text.push_str(&format!("  {}\n", tuning.interval_basis));
     }
-    if !tuning.samples.is_empty() {
-        text.push_str(&format!("\nSamples that correct the prediction\n{}", samples(tuning, terminal)));
-    }
     for warning in &tuning.warnings {
         text.push_str(&format!("  {} {warning}\n", terminal.warning("warning:")));
     }
     text
-}
-
-/// What was timed, beside what had been predicted.
-fn samples(tuning: &Tuning, terminal: Terminal) -> String {
-    let mut rows = vec![["  algorithm", "objects", "predicted", "measured"].map(str::to_owned).to_vec()];
-    rows.extend(tuning.samples.iter().map(|s| {
-        let algorithm = format!("  {}", s.algorithm);
-        vec![algorithm, grouped(u64::from(s.objects)), duration(s.predicted_ns), duration(s.measured_ns)]
-    }));
-    terminal.table(&rows)
 }
 
 fn scenarios(report: &Report) -> Vec<&str> {

@@ -1,42 +1,40 @@
-//! What standard output is, and so what can be shown on it.
+//! What standard output can show: its width and its colours.
 
 use console::{Style, Term};
 use sapwise_lab::text::{columns, width};
 
-/// Standard output where it is a terminal, or where it is none.
-///
-/// Whatever is printed takes one, so that a pipe or a file gets plain text and every table whole, and a test may have any.
+/// Standard output: a terminal, or a pipe or a file, which get plain text and whole tables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Terminal {
-    /// Characters in a line; `None` where standard output is no terminal.
+    /// Characters in a line; `None` if standard output is no terminal.
     pub(crate) columns: Option<usize>,
     /// Whether text may be coloured or bold.
     pub(crate) colour: bool,
 }
 
 impl Terminal {
-    /// No terminal.
+    /// A pipe or a file.
     pub(crate) const NONE: Self = Self { columns: None, colour: false };
 
-    /// What standard output is.
+    /// Looks at standard output.
     pub(crate) fn of_standard_output() -> Self {
         let out = Term::stdout();
         if !out.is_term() {
             return Self::NONE;
         }
-        // A terminal that does not tell its width is taken for a narrow one.
+        // 0 stands for an unknown width.
         let columns = out.size_checked().map_or(0, |(_, columns)| usize::from(columns));
         let is = |name: &str, wanted: fn(&str) -> bool| std::env::var(name).is_ok_and(|value| wanted(&value));
         let refused = is("NO_COLOR", |value| !value.is_empty()) || is("TERM", |value| value == "dumb");
-        // An empty NO_COLOR refuses nothing, though the library takes it for one that does; on Windows it turns colours on, too.
+        // The library takes an empty NO_COLOR for a refusal, which it is not. On Windows it also turns colours on.
         let colour = !refused && (cfg!(unix) || out.features().colors_supported());
         Self { columns: Some(columns), colour }
     }
 
-    /// A table whose first row is its head.
+    /// Draws a table whose first row is its head.
     ///
-    /// Columns at its right end that a terminal has no room for are left out, with a line below that names them: a row that is broken in
-    /// two can't be read by columns. The first two stay.
+    /// Leaves out columns at the right end that the terminal has no room for, and names them in a line below. The first
+    /// two stay.
     pub(crate) fn table(self, rows: &[Vec<String>]) -> String {
         let head = rows.first().map_or(&[][..], Vec::as_slice);
         let widths: Vec<usize> = (0..head.len()).map(|k| width(rows, k)).collect();
@@ -51,7 +49,7 @@ impl Terminal {
         format!("{}No room for: {missing}; a wider terminal or a file has them.\n", self.headed(&kept))
     }
 
-    /// The same with all columns.
+    /// Draws all columns.
     fn headed(self, rows: &[Vec<String>]) -> String {
         let text = columns(rows);
         match text.split_once('\n') {
@@ -60,22 +58,22 @@ impl Terminal {
         }
     }
 
-    /// What stands above something.
+    /// Styles a heading.
     pub(crate) fn head(self, text: &str) -> String {
         self.styled(text, Style::new().bold())
     }
 
-    /// What is as it should be.
+    /// Styles what is as it should be.
     pub(crate) fn good(self, text: &str) -> String {
         self.styled(text, Style::new().green())
     }
 
-    /// What the reader should know before relying on the rest.
+    /// Styles what the reader should know before relying on the rest.
     pub(crate) fn warning(self, text: &str) -> String {
         self.styled(text, Style::new().yellow())
     }
 
-    /// What went wrong.
+    /// Styles what went wrong.
     pub(crate) fn bad(self, text: &str) -> String {
         self.styled(text, Style::new().red().bold())
     }
@@ -114,7 +112,7 @@ mod tests {
         let narrow = "parameter  value\nclock      3.2 GHz\nNo room for: how; a wider terminal or a file has them.\n";
         assert_eq!(of(40), columns(&rows()));
         assert_eq!([of(39), of(5)], [narrow, narrow]);
-        // One that does not tell its width may be wide.
+        // A terminal of unknown width may be wide.
         assert_eq!(of(0), columns(&rows()));
     }
 }

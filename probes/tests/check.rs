@@ -12,7 +12,7 @@ fn report() -> Value {
     let samples = |ns: u64| json!([ns, ns + 1, ns + 2]);
     json!({
         "schema": "report/2",
-        "label": "simulated",
+        "label": "real_full",
         "provenance": {
             "version": "0.1.0", "date": "2026-01-01", "command": "probe --seed 1", "seed": 1, "threads": null,
             "simd": null, "optimised": true, "seconds": 1.0
@@ -78,13 +78,13 @@ fn sound_files_pass() {
     let again = write(folder.path(), "again.json", fs::read(&report).unwrap());
     let told = success(sapwise().arg("check").args([&report, &tuning, &again]));
     let next = format!("Next: sapwise study {} {} --out study", report.display(), again.display());
-    assert!(told.contains(&next), "{told}");
+    assert!(told.contains(&next) && told.contains("2 of 2 reports can be believed"), "{told}");
     let (status, findings) = check(&[report, tuning]);
     assert_eq!(status, 0, "{findings:?}");
     assert!(findings.iter().all(|f| f["sound"] == true && f["current"] == true), "{findings:?}");
     assert_eq!((&findings[0]["schema"], &findings[0]["applicable"]), (&"report/2".into(), &false.into()));
     assert_eq!((&findings[1]["schema"], &findings[1]["applicable"]), (&"tuning/2".into(), &true.into()));
-    assert!(findings[0]["notes"].to_string().contains("no evidence of accuracy"), "{findings:?}");
+    assert!(findings[0]["notes"].to_string().contains("measured on another machine: none"), "{findings:?}");
 }
 
 #[test]
@@ -113,7 +113,7 @@ fn stale_and_inapplicable_files_fail_and_say_which_algorithm() {
 }
 
 #[test]
-fn damaged_files_are_told_with_their_place_and_do_not_hide_the_others() {
+fn damaged_files_are_named_with_the_place_and_hide_no_others() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str, content: &[u8]| write(folder.path(), name, content);
     let good = report().to_string();
@@ -140,7 +140,6 @@ fn damaged_files_are_told_with_their_place_and_do_not_hide_the_others() {
         (path("latin1.json", b"{\n\"schema\": \"\xe9\"}"), "line 2"),
         (path("binary.json", &[0, 159, 146, 150]), "UTF-8"),
         (folder.path().join("huge.json"), "64 MiB"),
-        (folder.path().to_path_buf(), "folder"),
         (folder.path().join("absent.json"), "absent.json"),
         (path("steps.json", tuning(&json!([])).to_string().as_bytes()), "steps"),
     ];
@@ -172,7 +171,7 @@ fn train_refuses_what_is_no_report() {
     assert!(!out.exists());
 }
 
-/// What `damage` does to a report of this build that a machine was measured for, and what is told of it.
+/// What is changed in a sound report, and what is said about it.
 type Case = (&'static str, Value, &'static str);
 
 /// The findings on a sound report, each with one thing changed.
@@ -188,7 +187,7 @@ fn damaged(cases: &[Case]) -> Vec<Value> {
     check(&files).1
 }
 
-/// A report that a machine was measured for: restricted, proven and undisturbed.
+/// A report of a restricted, undisturbed machine.
 fn measured() -> Value {
     let mut report = report();
     let parameter = |name: &str, value: f64| {
@@ -199,10 +198,6 @@ fn measured() -> Value {
     };
     report["label"] = "real_restricted".into();
     report["provenance"]["threads"] = 64.into();
-    report["provenance"]["restriction"] = json!({
-        "kinds": ["threads"],
-        "proof": [{"kind": "threads", "parameter": "usable_cores", "without": 128.0, "with": 64.0, "shows": true}]
-    });
     let parameters = report["hardware"]["parameters"].as_array_mut().unwrap();
     parameters.extend([
         parameter("clock_measured_ghz", 4.0),
@@ -231,12 +226,10 @@ fn impossible_figures_and_revealing_texts_are_problems_that_name_them() {
     let silent = json!([{"algorithm": "brute@cpu1", "samples_ns": [], "error": null}]);
     let cases: Vec<Case> = vec![
         (parameter(0, "value"), 5000.0.into(), "usable_cores is 5000"),
-        (parameter(0, "value"), 1.5.into(), "usable_cores is 1.5"),
         (parameter(0, "value"), 32.0.into(), "brute@cpu64 ran on more threads than the usable cores"),
         (parameter(0, "value"), 128.0.into(), "the report is of 64 threads"),
         (parameter(0, "foreign_load"), 1.5.into(), "no share"),
         (parameter(1, "value"), 100.0.into(), "clock_measured_ghz is 100"),
-        (parameter(1, "dispersion"), (-0.5).into(), "dispersion"),
         (parameter(2, "value"), 8.0.into(), "simd_lanes is 8"),
         (parameter(5, "value"), 0.0.into(), "bandwidth_one_thread_gb_per_s is 0"),
         (parameter(6, "value"), 130.0.into(), "64 threads can't be more than 64 times as fast"),
@@ -244,12 +237,9 @@ fn impossible_figures_and_revealing_texts_are_problems_that_name_them() {
         ("/provenance/date", "yesterday".into(), "no day"),
         ("/provenance/simd", "avx2".into(), "avx2 was forced, and portable was in use"),
         ("/provenance/seconds", (-3.0).into(), "it took -3 s"),
-        ("/provenance/threads", Value::Null, "the restriction threads is not in the rest"),
-        ("/provenance/restriction/proof/0/with", 32.0.into(), "the proof of threads has usable_cores as Some(32.0)"),
         ("/points/1/foreign_load", 2.0.into(), "point 1 (uniform at 10 objects): a foreign load"),
         ("/points/1/fingerprint", "ff".into(), "16 hex digits"),
         ("/points/1/pairs", 46.into(), "46 pairs"),
-        ("/points/1/pairs", 3.into(), "2 and 3 pairs with one fingerprint"),
         ("/points/1/timings", twice, "stands there twice"),
         ("/points/1/timings", silent, "0 samples and the error None"),
         ("/points/1/timings/0/samples_ns", json!([1, 2, 9_000_000_000_u64]), "samples add up to 9.0 s"),
@@ -277,83 +267,106 @@ fn the_name_of_this_host_is_a_problem() {
 }
 
 #[test]
-fn a_file_that_is_too_large_is_a_problem() {
-    let folder = tempfile::tempdir().unwrap();
-    let filled = |bytes: usize| measured().to_string() + &" ".repeat(bytes);
-    let small = write(folder.path(), "small.json", filled(900_000));
-    let large = write(folder.path(), "large.json", filled(1_000_000));
-    let (status, findings) = check(&[small, large]);
-    assert_eq!((status, &findings[0]["problems"]), (1, &json!([])));
-    assert!(findings[1]["problems"].to_string().contains("more than the 1000000"), "{findings:?}");
-}
-
-#[test]
-fn doubtful_and_suspicious_figures_are_told_and_the_file_stays_sound() {
+fn doubts_and_notes_leave_a_file_sound() {
     let point = |load: f64| {
         let mut point = measured()["points"][0].clone();
         point["foreign_load"] = load.into();
         point
     };
     let loaded = json!([point(0.3), point(0.2), point(0.01), point(0.01)]);
-    let cases: Vec<Case> = vec![
-        ("/points", loaded, "over 5 % of the CPU at 2 of 4 points (50 %)"),
-        ("/hardware/parameters/5/dispersion", 0.5.into(), "dispersion over 20 %: bandwidth_one_thread_gb_per_s (50 %)"),
-        (
-            "/remarks",
-            json!(["interrupted after uniform at 10 objects; the rest is missing"]),
-            "it was cut short: interrupted after uniform",
-        ),
-        (
-            "/hardware/parameters/3/value",
-            3e6.into(),
-            "cache_l1d_bytes is 2.9 MiB and cache_l2_bytes is 1 MiB: one of them may be in another unit",
-        ),
-        (
-            "/provenance/restriction/proof/0/shows",
-            false.into(),
-            "the restriction threads does not show: usable_cores is 64",
-        ),
-        ("/provenance/date", "9999-01-01".into(), "its date is to come"),
-    ];
-    for ((pointer, value, text), finding) in cases.iter().zip(damaged(&cases)) {
-        assert_eq!(finding["problems"], json!([]), "{pointer} as {value}");
-        let kind = if ["/points", "/remarks"].contains(pointer) { "doubts" } else { "notes" };
-        assert!(finding[kind].to_string().contains(text), "{pointer} as {value}: {finding}");
-        assert_eq!(
-            finding.to_string().matches("interrupted after").count(),
-            usize::from(*pointer == "/remarks"),
-            "{finding}"
-        );
-    }
+    let calm = json!([point(0.3), point(0.01), point(0.01), point(0.01)]);
     // A disturbed measurement of one thread makes several look better than they are.
-    let impossible = |k: usize| {
-        let mut parameters = measured()["hardware"]["parameters"].clone();
-        parameters[k]["value"] = 71.0.into();
-        parameters
-    };
-    let finding = &damaged(&[("/hardware/parameters", impossible(6), "")])[0];
-    assert!(finding["doubts"].to_string().contains("64 threads can't be more than 64 times as fast"), "{finding}");
-    let labelled = |command: &str| {
-        let mut report = measured();
-        report["label"] = "real_contended".into();
-        report["provenance"]["command"] = command.into();
-        report["points"] = json!([point(0.3), point(0.3)]);
-        report
-    };
-    let by_whom: Vec<Case> =
-        vec![("", labelled("probe --seed 1"), ""), ("", labelled("probe --contended=cache --seed 1"), "")];
-    let told: Vec<bool> =
-        damaged(&by_whom).iter().map(|f| f["doubts"].to_string().contains("other programs")).collect();
-    assert_eq!(told, [true, false]);
+    let mut beyond = measured()["hardware"]["parameters"].clone();
+    beyond[6]["value"] = 71.0.into();
+    let mut moved = measured()["points"].clone();
+    moved.as_array_mut().unwrap().iter_mut().for_each(|p| p["core_to_core_ns"] = json!([23.0, 24.0]));
+    moved[0]["core_to_core_ns"] = json!([23.0, 175.0]);
     // One that was surely beaten rests and has fewer samples than the others.
-    let timings = json!([
+    let rested = json!([
         {"algorithm": "brute@cpu1", "samples_ns": [100, 101, 102], "error": null},
         {"algorithm": "brute@cpu64", "samples_ns": [900, 901], "error": null}
     ]);
-    let rested = &damaged(&[("/points/1/timings", timings, "")])[0];
-    assert_eq!(rested["problems"].as_array().map(Vec::len), Some(0), "{rested}");
-    let few: Vec<Case> = vec![("/points", json!([point(0.3), point(0.01), point(0.01), point(0.01)]), "")];
-    assert_eq!(damaged(&few)[0]["doubts"], json!([]));
+    let cut = json!(["interrupted after uniform at 10 objects; the rest is missing"]);
+    let cases: Vec<Case> = vec![
+        ("/points", loaded, "over 5 % of the CPU at 2 of 4 points (50 %)"),
+        ("/remarks", cut, "it was cut short: interrupted after uniform"),
+        ("/hardware/parameters", beyond, "64 threads can't be more than 64 times as fast"),
+        ("/points", moved, "the cores of the machine moved"),
+        ("/remarks", json!(["the restriction threads does not show"]), "remark: the restriction threads does not show"),
+        ("/points", calm, ""),
+        ("/points/1/timings", rested, ""),
+    ];
+    for (k, ((pointer, value, text), finding)) in cases.iter().zip(damaged(&cases)).enumerate() {
+        assert_eq!(finding["problems"], json!([]), "{pointer} as {value}");
+        let list = if k < 3 { "doubts" } else { "notes" };
+        assert!(finding[list].to_string().contains(text), "{pointer} as {value}: {finding}");
+        assert_eq!(finding["doubts"].as_array().unwrap().len(), usize::from(k < 3), "{finding}");
+    }
+}
+
+#[test]
+fn of_a_folder_a_table_says_which_reports_agree() {
+    let folder = tempfile::tempdir().unwrap();
+    let put = |name: &str, by: u64, change: &dyn Fn(&mut Value)| {
+        let mut report = measured();
+        for timing in
+            report["points"].as_array_mut().unwrap().iter_mut().flat_map(|p| p["timings"].as_array_mut().unwrap())
+        {
+            timing["samples_ns"]
+                .as_array_mut()
+                .unwrap()
+                .iter_mut()
+                .for_each(|ns| *ns = json!(ns.as_u64().unwrap() * by / 100));
+        }
+        change(&mut report);
+        write(folder.path(), name, report.to_string());
+    };
+    put("full.json", 100, &|_| {});
+    put("full-again.json", 102, &|_| {});
+    put("slow.json", 200, &|_| {});
+    put("cut.json", 1000, &|report| report["remarks"] = json!(["interrupted at the first point"]));
+    put("elsewhere.json", 300, &|report| report["hardware"]["machine"]["physical_id"] = "00000000000000aa".into());
+    write(folder.path(), "bad.json", "{");
+    let ended = sapwise().arg("check").arg(folder.path()).output().unwrap();
+    let told = String::from_utf8(ended.stdout).unwrap();
+    assert_eq!(ended.status.code(), Some(1), "{told}");
+    let row = |name: &str| {
+        let row = told.lines().find(|line| line.contains(name) && !line.contains(": "));
+        row.unwrap_or_else(|| panic!("no row of {name}: {told}"))
+            .split("  ")
+            .map(str::trim)
+            .filter(|c| !c.is_empty())
+            .map(str::to_owned)
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(row("/full.json")[2..4], ["good", "0.66"]);
+    assert_eq!(row("slow.json")[2..4], ["DOUBTFUL", "1.98"]);
+    assert_eq!(
+        (&row("cut.json")[2..], &row("elsewhere.json")[2..]),
+        (&["DOUBTFUL", "-", "-"].map(str::to_owned)[..], &["good", "-", "-"].map(str::to_owned)[..])
+    );
+    assert!(row("/full.json")[1] == row("slow.json")[1] && row("elsewhere.json")[1] != row("slow.json")[1], "{told}");
+    for text in [
+        "2.0 × the time of the other reports",
+        "bad.json: BAD",
+        "Kind 1: none, 64 cores, portable, no GPU",
+        "3 of 5 reports can be believed",
+    ] {
+        assert!(told.contains(text), "{text}: {told}");
+    }
+    assert!(!told.contains("/full.json: "), "{told}");
+    let json: Value =
+        serde_json::from_slice(&sapwise().args(["check", "--json"]).arg(folder.path()).output().unwrap().stdout)
+            .unwrap();
+    assert_eq!(json["files"].as_array().unwrap().len(), 6);
+    let slow = json["kinds"][0]["reports"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|r| r["file"].as_str().unwrap().ends_with("slow.json"));
+    assert_eq!(slow.unwrap()["over_others"]["timings"], 2, "{json}");
+    let empty = tempfile::tempdir().unwrap();
+    assert!(failure(sapwise().arg("check").arg(empty.path()), 1).contains("holds no *.json file"));
 }
 
 #[test]
@@ -372,38 +385,6 @@ fn the_published_cards_are_sound_and_told_to_be_published() {
     let out = tempfile::tempdir().unwrap();
     let complaint = failure(sapwise().args(["train", "--out"]).arg(out.path().join("m.json")).args(&cards), 1);
     assert!(complaint.contains("published parameters, without timings"), "{complaint}");
-}
-
-#[test]
-fn simulated_machines_train_apart_and_are_told_to_be_simulated() {
-    let folder = tempfile::tempdir().unwrap();
-    let machines = folder.path().join("machines");
-    let mut simulate = sapwise();
-    simulate.args(["simulate", "--machines", "2", "--json", "--out"]).arg(&machines);
-    let answer: Value = serde_json::from_str(&success(&mut simulate)).unwrap();
-    let files: Vec<PathBuf> = answer["files"].as_array().unwrap().iter().map(|f| f.as_str().unwrap().into()).collect();
-    assert_eq!(files.len(), 2);
-    let complaint = failure(&mut simulate, 1);
-    assert!(complaint.contains("machines holds *.json files already; name another with --out"), "{complaint}");
-    let (status, findings) = check(&files);
-    let told = |f: &Value| {
-        f["notes"].as_array().unwrap().iter().any(|n| n.as_str().unwrap().contains("no evidence of accuracy"))
-    };
-    assert!(status == 0 && findings.iter().all(told), "{findings:?}");
-    let model = folder.path().join("model.json");
-    let train = |words: &[&str]| {
-        let mut command = sapwise();
-        command.arg("train").arg(&machines).args(words).arg("--out").arg(&model);
-        command
-    };
-    let complaint = failure(&mut train(&[]), 1);
-    assert!(complaint.contains("--simulated") && !model.exists(), "{complaint}");
-    success(&mut train(&["--simulated"]));
-    let (status, findings) = check(std::slice::from_ref(&model));
-    assert!(status == 0 && told(&findings[0]), "{findings:?}");
-    let predicted =
-        success(sapwise().args(["predict", "--json", "--report"]).arg(&files[0]).arg("--model").arg(&model));
-    assert!(predicted.contains("trained on simulated machines"), "{predicted}");
 }
 
 #[test]

@@ -2,21 +2,14 @@
 
 mod common;
 
-use common::{failure, sapwise, success};
+use common::{failure, sapwise, small_report, success};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::LazyLock;
-
-/// A report of this machine with a few small sizes.
-static REPORT: LazyLock<Value> = LazyLock::new(|| {
-    let words = ["probe", "--scenario", "uniform", "--max-objects", "100", "--json"];
-    serde_json::from_str(&success(sapwise().args(words))).unwrap()
-});
 
 /// Stores the report with values at JSON pointers changed.
 fn report(folder: &Path, name: &str, changes: &[(&str, Value)]) -> PathBuf {
-    let mut report = REPORT.clone();
+    let mut report = small_report("a");
     for (pointer, value) in changes {
         *report.pointer_mut(pointer).unwrap() = value.clone();
     }
@@ -52,19 +45,12 @@ fn assert_tuning(tuning: &Value, source: &str) {
     }
 }
 
-/// Trains on the report under the names of two machines. The label of an optimised build is put on it for that, and that of an
-/// undisturbed machine, which one that runs tests is not.
+/// Trains on the report under the names of two machines.
 fn train(folder: &Path) -> (PathBuf, Value) {
-    let optimised = ("/provenance/optimised", true.into());
-    let undisturbed = ("/label", "real_full".into());
-    let a = report(folder, "a.json", &[optimised.clone(), undisturbed.clone()]);
+    let a = report(folder, "a.json", &[]);
     // One sample differs, so that it isn't taken for the same measurement.
     let slower = ("/points/0/timings/0/samples_ns/0", 123_456.into());
-    let b = report(
-        folder,
-        "b.json",
-        &[optimised, undisturbed, slower, ("/hardware/machine/physical_id", "00000000000000bb".into())],
-    );
+    let b = report(folder, "b.json", &[slower, ("/hardware/machine/physical_id", "00000000000000bb".into())]);
     let model = folder.join("model.json");
     let trained = answer(sapwise().arg("train").args([a, b]).arg("--json").arg("--out").arg(&model));
     (model, trained)
@@ -88,39 +74,8 @@ fn train_and_predict_keep_their_contracts() {
     predict.arg("predict").arg("--report").arg(&own).arg("--model").arg(&model).arg("--json").arg("--out").arg(&out);
     let tuning = answer(&mut predict);
     assert_tuning(&tuning, "predicted");
-    assert!(tuning.get("samples").is_none(), "{tuning}");
-    // Of another machine no sample can be had, and whoever did not ask for none is told.
-    let said = |words: &[&str]| {
-        let text = success(sapwise().args(["predict", "--report"]).arg(&own).arg("--model").arg(&model).args(words));
-        text.contains("No sample was taken")
-    };
-    assert!(!said(&[]) && said(&["--samples", "3"]) && !said(&["--samples", "0"]));
     assert_eq!(tuning["model"], "model");
     assert_eq!(serde_json::from_str::<Value>(&fs::read_to_string(&out).unwrap()).unwrap(), tuning);
-}
-
-#[test]
-fn train_draws_what_the_name_of_the_file_asks_for() {
-    let folder = tempfile::tempdir().unwrap();
-    train(folder.path());
-    let file = |name: &str| folder.path().join(name);
-    let plot = |name: &str| {
-        let mut train = sapwise();
-        train.arg("train").args([file("a.json"), file("b.json")]).arg("--out").arg(file("m.json"));
-        train.arg("--plot").arg(file(name));
-        train
-    };
-    success(&mut plot("p.svg"));
-    let svg = fs::read_to_string(file("p.svg")).unwrap();
-    for needed in ["2 physical machines", "Made by: sapwise train (2 reports or folders) --out m.json --plot p.svg"] {
-        assert!(svg.contains(needed), "{needed}: {svg}");
-    }
-    success(&mut plot("p.png"));
-    assert!(fs::read(file("p.png")).unwrap().starts_with(b"\x89PNG\r\n"));
-    // Before any work is done.
-    fs::remove_file(file("m.json")).unwrap();
-    let complaint = failure(&mut plot("p.pdf"), 2);
-    assert!(complaint.contains(".svg or .png") && !file("m.json").exists(), "{complaint}");
 }
 
 #[test]
@@ -193,7 +148,6 @@ fn run_keeps_its_contract() {
 #[test]
 fn run_refuses_tuning_and_reports_of_other_revisions() {
     let folder = tempfile::tempdir().unwrap();
-    let method = REPORT["algorithms"][0]["id"].as_str().unwrap().split('@').next().unwrap().to_owned();
     let old = report(folder.path(), "old.json", &[("/algorithms/0/revision", 999_999.into())]);
     let own = report(folder.path(), "own.json", &[]);
     let mut tuning = answer(sapwise().args(["predict", "--measured", "--json", "--report"]).arg(own));
@@ -202,32 +156,10 @@ fn run_refuses_tuning_and_reports_of_other_revisions() {
     fs::write(&stale, tuning.to_string()).unwrap();
     for (file, name) in [(&old, "old.json"), (&stale, "stale.json")] {
         let complaint = failure(sapwise().args(["run", "uniform", "--tuning"]).arg(file), 1);
-        for text in [name, &method, "999999", "probe again"] {
+        for text in [name, "brute", "999999", "probe again"] {
             assert!(complaint.contains(text), "{text} is missing: {complaint}");
         }
     }
-}
-
-#[test]
-fn samples_on_this_machine_correct_the_prediction_and_are_listed() {
-    let sampled = |k: &str| answer(sapwise().args(["predict", "--no-gpus", "--json", "--samples", k]));
-    let pure = sampled("0");
-    assert_tuning(&pure, "predicted");
-    assert!(pure.get("samples").is_none(), "{pure}");
-    let tuning = sampled("3");
-    assert_tuning(&tuning, "learned");
-    assert_eq!(tuning["model"], pure["model"]);
-    let samples = tuning["samples"].as_array().unwrap();
-    assert!((1..=3).contains(&samples.len()), "{samples:?}");
-    for sample in samples {
-        assert_keys(sample, &["algorithm", "objects", "predicted_ns", "measured_ns"]);
-        assert!(sample["measured_ns"].as_f64().unwrap() >= 1.0, "{sample}");
-    }
-    assert_eq!(tuning["interval_basis"], pure["interval_basis"]);
-    let read = sapwise::json::tuning(&tuning.to_string()).unwrap();
-    assert_eq!((read.source, read.samples.len()), (sapwise::Source::Learned, samples.len()));
-    let text = success(sapwise().args(["predict", "--no-gpus", "--samples", "1"]));
-    assert!(text.contains("Samples that correct the prediction"), "{text}");
 }
 
 #[test]

@@ -4,7 +4,7 @@ mod common;
 
 #[cfg(unix)]
 use common::{TERMINATED, send};
-use common::{failure, remarks_but_of_moves, sapwise, success};
+use common::{failure, sapwise, success};
 use sapwise::ParameterId;
 use sapwise_lab::report::{Label, Report};
 use std::fs;
@@ -33,7 +33,7 @@ fn a_probe_writes_a_report_that_reads_back_with_every_parameter_and_point() {
     assert_eq!(report.provenance.command, "probe --seed 9 --max-objects 20 --scenario uniform");
     assert_eq!(report.provenance.seed, 9);
     // Nothing but what a machine that others use says of itself.
-    assert_eq!(remarks_but_of_moves(&report), report.hardware.disturbed());
+    assert_eq!(report.remarks, report.hardware.disturbed());
     assert_eq!(report.provenance.optimised, !cfg!(debug_assertions));
     // One point a line, so that a report can be read and compared by people.
     let lines = fs::read_to_string(&out).unwrap();

@@ -119,24 +119,10 @@ fn tuning_of_another_machine_is_used_and_what_is_missing_here_is_named() {
 }
 
 #[test]
-fn a_prediction_without_samples_is_told_as_such() {
-    let words = [
-        "run",
-        "uniform",
-        "--samples",
-        "0",
-        "--no-gpus",
-        "--objects",
-        "100",
-        "--frames",
-        "3",
-        "--repeats",
-        "2",
-        "--json",
-    ];
-    let told = answer(sapwise().args(words));
+fn without_a_tuning_it_is_predicted() {
+    let words = "run uniform --no-gpus --objects 100 --frames 3 --repeats 2 --json";
+    let told = answer(sapwise().args(words.split(' ')));
     assert_eq!((&told["source"], &told["tuning"]["from"]), (&"predicted".into(), &"prediction".into()));
-    assert_eq!(told["tuning"]["samples"], 0);
 }
 
 #[test]
@@ -163,26 +149,18 @@ fn every_frame_is_traced_and_drawn() {
             run("fragmentation", &tuning, &words).arg("--trace").arg(file(trace)).arg("--plot").arg(file(plot)),
         );
         assert!(text.contains(trace) && text.contains(plot), "{text}");
-        // Two of five methods ran, and one more at most is the fastest on a number of threads.
-        assert!(text.contains("Not in the picture: ") && text.contains("it shows the algorithms that ran"), "{text}");
     };
     both("a.csv", "a.svg");
-    both("b.csv", "a.png");
+    both("b.csv", "a.svg");
     let csv = fs::read_to_string(file("a.csv")).unwrap();
     assert_eq!(csv.lines().count(), 13);
     assert!(csv.starts_with("frame,objects,") && csv.lines().nth(1).unwrap().contains("brute@cpu1"), "{csv}");
     let svg = fs::read_to_string(file("a.svg")).unwrap();
-    for needed in [
-        "brute@cpu1: ran in ",
-        "Made by: sapwise run fragmentation --tuning steps.json",
-        "written by hand",
-        "Not in the picture: ",
-    ] {
+    for needed in ["brute@cpu1", "Made by: sapwise run fragmentation --tuning steps.json", "written by hand"] {
         assert!(svg.contains(needed), "{needed}");
     }
     // The folder is of this machine alone.
     assert!(!svg.contains(folder.path().to_str().unwrap()));
-    assert!(fs::read(file("a.png")).unwrap().starts_with(b"\x89PNG\r\n"));
 }
 
 #[test]
@@ -217,7 +195,7 @@ fn what_can_not_be_run_is_refused_with_what_to_do() {
         (scene.clone(), &["--objects", "3"], 2, &["--objects", "stream"]),
         ("uniform".into(), &["--frames", "5", "--after", "5"], 2, &["--after 5", "1 to 4"]),
         ("uniform".into(), &["--frames", "5", "--co-runner", "5:1"], 2, &["--co-runner 5", "0 to 4"]),
-        ("uniform".into(), &["--plot", "a.pdf"], 2, &["a.pdf", ".svg or .png"]),
+        ("uniform".into(), &["--plot", "a.pdf"], 2, &["a.pdf", ".svg"]),
     ];
     for (scene, words, status, needed) in cases {
         let complaint = failure(&mut run(&scene, &tuning, words), status);
@@ -226,7 +204,7 @@ fn what_can_not_be_run_is_refused_with_what_to_do() {
     let nowhere = folder.path().join("missing").join("a.svg");
     let complaint = failure(run("uniform", &tuning, &[]).arg("--plot").arg(&nowhere), 1);
     assert!(complaint.contains("a.svg") && complaint.contains("no such folder"), "{complaint}");
-    for words in [["--co-runner", "x"], ["--samples", "3"], ["--trace", "a.txt"]] {
+    for words in [["--co-runner", "x"], ["--trace", "a.txt"]] {
         failure(&mut run("uniform", &tuning, &words), 2);
     }
     let complaint = failure(run(&scene, &tuning, &[]).arg("--trace").arg(folder.path().join("steps.json")), 2);

@@ -2,22 +2,21 @@
 
 mod common;
 
-use common::{sapwise, success};
-use std::path::PathBuf;
+use common::{sapwise, small_report, success};
+use std::fs;
 #[cfg(target_os = "linux")]
 use std::process::Command;
 
-fn report() -> PathBuf {
-    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../datasets/earlier/amd-epyc-2c-full--2026-11-21.json"))
-}
-
-/// What the prediction for a report shows on a terminal of that many columns. `None`, with a line that says so, where the program is missing
-/// that makes a terminal.
+/// What the prediction for a report shows on a terminal of that many columns. `None`, with a line that says so, where
+/// the program is missing that makes a terminal.
 #[cfg(target_os = "linux")]
 fn on_a_terminal(columns: u32, variables: &[(&str, &str)]) -> Option<String> {
     let quoted = |text: &str| format!("'{text}'");
     let program = quoted(&assert_cmd::cargo::cargo_bin!("sapwise").display().to_string());
-    let report = quoted(&report().display().to_string());
+    let folder = tempfile::tempdir().unwrap();
+    let report = folder.path().join("report.json");
+    fs::write(&report, small_report("a").to_string()).unwrap();
+    let report = quoted(&report.display().to_string());
     let mut command = Command::new("script");
     for name in ["NO_COLOR", "LC_ALL", "LC_CTYPE", "SAPWISE_SIMD"] {
         command.env_remove(name);
@@ -54,7 +53,10 @@ fn a_terminal_has_bold_heads_and_may_refuse_colours() {
 fn a_pipe_gets_no_colours() {
     let mut command = sapwise();
     command.env("TERM", "xterm-256color").env("CLICOLOR_FORCE", "1").env("LANG", "C.UTF-8");
-    let text = success(command.args(["predict", "--no-gpus", "--report"]).arg(report()));
+    let folder = tempfile::tempdir().unwrap();
+    let report = folder.path().join("report.json");
+    fs::write(&report, small_report("a").to_string()).unwrap();
+    let text = success(command.args(["predict", "--no-gpus", "--report"]).arg(report));
     assert!(text.is_ascii() && !text.contains('\u{1b}'), "{text}");
     assert!(text.contains("\nNext: "), "{text}");
 }

@@ -1,7 +1,9 @@
-//! A user's program with an algorithm of its own: the example `own_algorithm` from the probe to the run, beside the plain command.
+//! A user's program with an algorithm of its own: the example `own_algorithm` from the probe to the run, beside the
+//! plain command.
 //!
-//! This program has a `main` of its own (`harness = false`): verbs start parts of a measurement as processes of the program that
-//! they are in, and one made by the usual harness would run tests there. Started with [`AS_COMMAND`] it is the example.
+//! This program has a `main` of its own (`harness = false`): verbs start parts of a measurement as processes of the
+//! program that they are in, and one made by the usual harness would run tests there. Started with [`AS_COMMAND`] it is
+//! the example.
 
 mod common;
 #[path = "../examples/own_algorithm.rs"]
@@ -87,8 +89,8 @@ fn names(list: &Value) -> Vec<&str> {
     list.as_array().unwrap().iter().map(|entry| entry.as_str().unwrap()).collect()
 }
 
-/// The report of a small probe. The label of an optimised build is put on it, and that of an undisturbed machine, which one that
-/// runs tests is not.
+/// The report of a small probe. The label of an optimised build is put on it, and that of an undisturbed machine, which
+/// one that runs tests is not.
 fn probed(folder: &Path) -> PathBuf {
     let path = folder.join("report.json");
     let words = ["probe", "--no-gpus", "--scenario", "uniform", "--max-objects", "1000", "--out"];
@@ -178,7 +180,8 @@ fn check_names_a_number_of_threads_that_it_can_not_be_made_on(tuning: &Path) {
 fn the_pairs_are_those_of_ours() {
     let folder = tempfile::tempdir().unwrap();
     let inf = f32::INFINITY;
-    // Touching boxes in a row, one without a volume, one without an end, two far out that lie beyond each other, two that meet there.
+    // Touching boxes in a row, one without a volume, one without an end, two far out that lie beyond each other, two
+    // that meet there.
     let mut boxes: Vec<[f32; 6]> = (0..9).map(|k| k as f32).map(|x| [x, 0.0, 0.0, x + 1.0, 1.0, 1.0]).collect();
     boxes.extend([[3.0; 6], [-inf, -inf, -inf, inf, inf, inf], [-inf, 0.0, 0.0, 4.5, inf, inf]]);
     boxes.extend([[1e30, 0.0, 0.0, 2e30, 1.0, 1.0], [3e30, 0.0, 0.0, 4e30, 1.0, 1.0], [4e30, 1.0, 0.0, inf, 1.0, 1.0]]);

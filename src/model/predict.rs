@@ -30,7 +30,7 @@ const NO_INTERVALS: &str =
     "no interval: too few machines like this one were measured to know the error of a prediction on it";
 
 /// What to do if a machine is unlike those of the training.
-pub const ASK: &str = "this machine is unlike those of the training: measure it with `sapwise probe --out report.json`, then \
+const ASK: &str = "this machine is unlike those of the training: measure it with `sapwise probe --out report.json`, then \
                    `sapwise predict --report report.json --measured`";
 
 /// Costs that are known already, by method and backend.

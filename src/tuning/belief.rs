@@ -11,7 +11,6 @@
 //! all of their algorithms: in 88 replayed runs it changed costs by 0.0 +- 0.4 %, and made the covariances of the shared parts thirty times as large.
 
 mod basis;
-mod observed;
 mod own;
 mod part;
 
@@ -24,7 +23,6 @@ use part::Part;
 use std::sync::Arc;
 
 pub(crate) use basis::View;
-pub use observed::{Observed, Slope};
 pub(crate) use part::Deviations;
 
 /// Functions of the load that a part consists of beside its constant. More places tell a little more of scenes that were measured and a little less of
@@ -194,13 +192,6 @@ impl Belief {
             shared: shared.max(0.0),
             own: dot(&self.own_with, &values).max(0.0),
         }
-    }
-
-    /// Covariance of an algorithm's cost with the observation that was [expected](Self::expect) last, of algorithm `observed`.
-    fn along(&self, observed: usize, slope: &Slope) -> f64 {
-        let shared: f64 = slope.shared.iter().map(|&(k, weight)| weight * self.with[k]).sum();
-        let own = if observed == slope.algorithm { dot(&self.own_with, &slope.own) } else { 0.0 };
-        shared + own
     }
 
     /// Variance of the own part of an algorithm.

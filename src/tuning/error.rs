@@ -19,13 +19,6 @@ pub enum TuningError {
         /// The algorithm above it.
         above: AlgorithmId,
     },
-    /// A sample whose time is not above zero.
-    Sample {
-        /// The algorithm.
-        algorithm: AlgorithmId,
-        /// The number of objects.
-        objects: u32,
-    },
     /// A cost that names a missing work. Only in files.
     NoWork {
         /// The algorithm.
@@ -71,9 +64,6 @@ impl fmt::Display for TuningError {
             Self::StepOrder => f.write_str("the steps are not ascending"),
             Self::Crossover { below, above } => {
                 write!(f, "the crossover from {below} to {above} does not lie within its interval")
-            }
-            Self::Sample { algorithm, objects } => {
-                write!(f, "the sample of {algorithm} at {objects} objects has no time above zero")
             }
             Self::NoWork { algorithm, work } => write!(f, "the cost of {algorithm}: there is no work {work}"),
             Self::NoFallback { work } => {

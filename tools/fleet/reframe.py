@@ -1,14 +1,15 @@
 """ReFrame test that probes every node of a cluster, each alone, into one shared folder.
 
     reframe -C site.py -c tools/fleet/reframe.py -r --distribute=idle -S reports=/shared/reports
-    sapwise fleet /shared/reports
+    sapwise check /shared/reports
 
-`--distribute=idle` makes one job of it for each idle node; without it, as with ReFrame's own generic system, it runs on this machine.
-`-S reports=FOLDER` names the shared folder, which is made where it is missing; `-S sapwise=PATH` the command where it is not on the PATH;
-`-S options=--quick,--no-gpus` further options of `sapwise probe`. A node whose report is complete is not measured again.
+`--distribute=idle` makes one job for each idle node; without it, as with ReFrame's own generic system, the test runs on
+this machine. `-S reports=FOLDER` names the shared folder, which the test creates if it is missing; `-S sapwise=PATH` the
+command if it is not on the PATH; `-S options=--quick,--no-gpus` further options of `sapwise probe`. A node whose report
+is complete is not measured again.
 
-What ReFrame keeps of each run are hardware parameters, so that a node can be held against itself of last month; `sapwise fleet` holds the nodes
-against each other. Tried with ReFrame 4.10.
+ReFrame keeps hardware parameters of each run, which compares a node with itself a month ago; `sapwise check` compares
+the nodes with each other. Tried with ReFrame 4.10.
 """
 
 import json
@@ -23,7 +24,7 @@ from reframe.core.exceptions import SanityError
 
 @rfm.simple_test
 class SapwiseProbe(rfm.RunOnlyRegressionTest):
-    """`sapwise probe` on one node. Fails where the report is cut short, and where a hardware parameter that it names was not measured."""
+    """`sapwise probe` on one node. Fails if the report was cut short or lacks a parameter that the test names."""
 
     descr = "Sapwise: hardware parameters and broad-phase timings of a node"
     maintainers = ["sapwise"]
@@ -39,7 +40,7 @@ class SapwiseProbe(rfm.RunOnlyRegressionTest):
 
     @run_after("init")
     def share(self):
-        # Before the stage folder becomes the working folder of the job.
+        # Before the job changes to its stage folder.
         self.reports = os.path.abspath(self.reports)
 
     @run_before("run")
@@ -47,7 +48,7 @@ class SapwiseProbe(rfm.RunOnlyRegressionTest):
         os.makedirs(self.reports, exist_ok=True)
         self.executable = self.sapwise
         self.executable_opts = ["probe", "--json", "--out", self.reports, *self.options]
-        # Two nodes may share a host name, and not the name that Slurm has for them. Empty elsewhere, which counts as not set.
+        # Two nodes may share a host name, but not the name that Slurm has for them. Without Slurm it is empty: not set.
         self.prerun_cmds = ['export SAPWISE_NODE="${SLURMD_NODENAME:-}"']
 
     def report(self):

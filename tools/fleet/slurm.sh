@@ -3,20 +3,23 @@
 #SBATCH --exclusive
 #SBATCH --ntasks-per-node=1
 #SBATCH --time=00:15:00
-# Probes every node of a Slurm job, each alone, into one shared folder, tells which can be believed, and trains on them where all can.
+# Probes every node of a Slurm job, each alone, into one shared folder, and ends with the table of `sapwise check`.
 #
 #   sbatch --nodes=16 tools/fleet/slurm.sh REPORTS [OPTION OF probe...]
 #
-# REPORTS is made where it is missing. Submitted again, it measures the nodes whose report is missing, was disturbed or cut short. The model goes to
-# REPORTS/model/. SAPWISE names the command where it is not on the PATH.
+# Creates REPORTS if it is missing. Submitted again, it measures the nodes whose report is missing, was disturbed or cut
+# short. SAPWISE names the command if it is not on the PATH. The exit status is 1 if a node left no report or a report
+# has a problem.
 set -euo pipefail
 [ $# -ge 1 ] || { echo "usage: sbatch --nodes=N tools/fleet/slurm.sh REPORTS [OPTION OF probe...]" >&2; exit 2; }
 folder=$1
 shift
 sapwise=${SAPWISE:-sapwise}
 mkdir -p "$folder"
-# A node that fails keeps no other from its end: the table tells. Two nodes may share a host name, and not the name that Slurm has for them.
-srun --ntasks-per-node=1 --kill-on-bad-exit=0 bash -c 'export SAPWISE_NODE=$SLURMD_NODENAME; exec "$@"' probe "$sapwise" probe --out "$folder" "$@" || true
-"$sapwise" fleet "$folder" --nodes "$SLURM_JOB_NUM_NODES"
-mkdir -p "$folder/model"
-"$sapwise" train "$folder" --out "$folder/model/model.json" --card "$folder/model/card.md"
+# A node that fails does not end the others. Two nodes may share a host name, but not the name that Slurm has for them.
+srun --ntasks-per-node=1 --kill-on-bad-exit=0 \
+    bash -c 'export SAPWISE_NODE=$SLURMD_NODENAME; exec "$@"' probe "$sapwise" probe --out "$folder" "$@" || true
+there=$(find "$folder" -maxdepth 1 -name '*.json' | wc -l)
+[ "$there" = 0 ] || "$sapwise" check "$folder"
+[ "$there" -ge "$SLURM_JOB_NUM_NODES" ] \
+    || { echo "$there of $SLURM_JOB_NUM_NODES nodes left a report; submit the job again, which measures the others"; exit 1; }

@@ -27,9 +27,3 @@ pub fn meaning(label: Label) -> &'static str {
         Label::Published => "parameters from a publication, without timings",
     }
 }
-
-/// Whether timings under this label are evidence of how fast a real machine is.
-#[must_use]
-pub fn is_evidence(label: Label) -> bool {
-    label != Label::Simulated
-}

@@ -23,26 +23,18 @@
 //!
 //! Times are in nanoseconds, and a regret is the time of the choice over that of the best choice, less one.
 
-pub mod belief;
-pub mod compare;
-pub mod convert;
 pub mod data;
-pub mod data_table;
 pub mod evaluate;
 pub mod figures;
 pub mod fit;
-pub mod fleet;
+pub mod kinds;
 pub mod label_text;
 pub mod model_card;
-pub mod page;
-pub mod paired;
+mod paired;
 pub mod progress;
-pub mod ranks;
 pub mod report;
 mod schemas;
-pub mod simulated;
 pub mod spread;
-pub mod steadiness;
 pub mod study;
 pub mod sweep;
 #[cfg(test)]

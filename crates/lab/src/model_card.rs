@@ -63,9 +63,7 @@ assumption, not a count: log-normal around 800 objects, two thirds of the frames
 
 /// What the strategies are, below the scores.
 const STRATEGIES: &str = "
-`physics + load` is what `predict` does; `physics` the same without the residual; `ours + 8 samples` corrects it by eight timings,
-on at most 64 of the held-out reports: they are chosen among all scenarios, where `predict --samples 8` times the one that it shows, and are replayed
-from the timings by which the choice is judged, so that they are as exact as these. `random forest` predicts each method's time from
+`physics + load` is what `predict` does; `physics` the same without the residual. `random forest` predicts each method's time from
 load and hardware parameters and knows no physics. `direct regression` is the paper's: the position of each crossover as a power law of
 hardware parameters, and a choice by the number of objects alone. Notes say how many of its crossovers are means: there were no more
 machines with that crossing than parameters to regress it on. `frozen constants (64)` and `(1000)` switch from brute force at the number of
@@ -156,11 +154,6 @@ fn intervals(validation: &Validation) -> String {
         percent(c.times),
         percent(c.ratios)
     )
-}
-
-/// How much of the gap to the oracle a strategy closes; nothing where it costs more than the best single algorithm.
-pub(crate) fn gap_closed(share: f64) -> String {
-    if share < 0.0 { "none".to_owned() } else { percent(share) }
 }
 
 /// Over all sizes and, in parentheses, as games have them.

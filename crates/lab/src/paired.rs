@@ -1,187 +1,207 @@
-//! Paired comparisons: where one algorithm overtakes another, from timings of both on the same frames.
+//! Two algorithms side by side over the number of objects, from timings of both on the same frames.
 //!
-//! For each point the median over frames of `ln(first / second)` is taken, lines are fitted through nearby medians over the
-//! logarithm of the size, and their roots are the crossings. Pairing frame by frame cancels what disturbed both, the median
-//! ignores single disturbed frames, and a line uses the neighbouring sizes. The interval of a crossing holds the sizes around it
-//! at which neither algorithm is told from the other: where the medians are noisy or the ratio is flat it is wide.
+//! At each size the median over frames of `ln(first / second)` is taken: pairing frame by frame cancels what disturbed
+//! both.
 
-mod ratio;
+use sapwise::stats::{NORMAL_90, mean, median, robust_deviation};
+use std::collections::BTreeMap;
 
-use ratio::Ratio;
-use sapwise::stats::NORMAL_90;
+/// Standard error of a median over that of a mean, for a normal distribution.
+const MEDIAN_OVER_MEAN: f64 = 1.2533;
 
-pub use ratio::PairedSamples;
-
-/// Which of two algorithms is cheaper at which sizes, within the sizes that were measured.
-#[derive(Debug, Clone, PartialEq)]
-pub enum PairedOutcome {
-    /// One crossing.
-    At(PairedCrossing),
-    /// The first is cheaper throughout, or where neither is distinguishable from the other, cheaper on average.
-    AlwaysFirst,
-    /// The same for the second.
-    AlwaysSecond,
-    /// More than one crossing, ascending by objects.
-    Several(Vec<PairedCrossing>),
-}
-
-/// A crossing.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PairedCrossing {
-    /// Number of objects at which both cost the same.
-    pub objects: f64,
-    /// Lower end of the 90 % interval. Equal to the smallest measured size when the crossing may lie below it.
-    pub low: f64,
-    /// Upper end of the 90 % interval. Equal to the largest measured size when the crossing may lie above it.
-    pub high: f64,
-    /// Whether the first algorithm is the cheaper one with fewer objects.
-    pub first_below: bool,
-}
-
-impl PairedOutcome {
-    /// The crossings, ascending by objects; none when one algorithm is always cheaper.
-    #[must_use]
-    pub fn positions(&self) -> &[PairedCrossing] {
-        match self {
-            Self::At(position) => std::slice::from_ref(position),
-            Self::Several(positions) => positions,
-            Self::AlwaysFirst | Self::AlwaysSecond => &[],
-        }
-    }
-}
-
-/// Quantile of the normal distribution that pure noise exceeds in one case of a hundred.
+/// Quantile of the normal distribution that noise alone exceeds in one case of a hundred.
 const DISTINCT: f64 = 2.326;
 
-/// Where `first` and `second` of `points` cross. See [`PairedComparison`].
-#[must_use]
-pub fn compare(points: &[PairedSamples<'_>]) -> Option<PairedOutcome> {
-    Some(PairedComparison::new(points)?.outcome())
+/// Two times that differ by less than this count as equal, however exact they are.
+const LEAST_LN: f64 = 0.02;
+
+/// Frames of two algorithms at one size. The k-th sample of both is the same frame; a sample without a partner is
+/// ignored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct PairedSamples<'a> {
+    /// Objects in each frame.
+    pub(crate) objects: u32,
+    /// Nanoseconds of the first algorithm.
+    pub(crate) first_ns: &'a [u64],
+    /// Nanoseconds of the second algorithm.
+    pub(crate) second_ns: &'a [u64],
 }
 
-/// The costs of two algorithms beside each other, over the sizes at which both were timed.
-#[derive(Debug, Clone)]
-pub struct PairedComparison {
-    ratio: Ratio,
-    /// `ln(first / second)` at each place of the grid.
-    curve: Vec<f64>,
-    /// The same in units of what is told from zero: the first is distinctly cheaper at -1, the second at 1.
-    told: Vec<f64>,
+/// `ln(first / second)` over the number of objects, at three sizes or more.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct PairedRatio {
+    /// Ascending by size, each size once.
+    sizes: Vec<Size>,
 }
 
-impl PairedComparison {
-    /// Compares the algorithms over `points`, in the order of measurement.
-    ///
-    /// A point whose size is not above the one before begins another round: what changed between rounds widens the intervals.
-    /// Sizes may stand several times and need not be evenly spaced. Pass only points at which both were timed. `None` with
-    /// fewer than three sizes that have a pair of samples above zero.
-    #[must_use]
-    pub fn new(points: &[PairedSamples<'_>]) -> Option<Self> {
-        let ratio = Ratio::new(points, DISTINCT)?;
-        let curve = ratio.curve();
-        let told = curve.iter().map(|e| e.in_units_of(NORMAL_90)).collect();
-        Some(Self { ratio, curve: curve.iter().map(|e| e.value).collect(), told })
+/// A number of objects at which the two cost the same.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Crossing {
+    /// Number of objects.
+    pub(crate) objects: f64,
+    /// Whether the first algorithm is the cheaper one with fewer objects.
+    pub(crate) first_below: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Size {
+    ln_objects: f64,
+    /// Above zero where the second algorithm is cheaper.
+    ratio_ln: f64,
+    error_ln: f64,
+}
+
+impl Size {
+    /// Of the ratios at each point of one size, with their spread over the frames.
+    fn of(objects: u32, points: &[(f64, f64)]) -> Self {
+        let (ratios, errors): (Vec<f64>, Vec<f64>) = points.iter().copied().unzip();
+        // What changed between two points shows in neither's frames.
+        let between = robust_deviation(&ratios).unwrap_or(0.0) * MEDIAN_OVER_MEAN;
+        let error_ln = mean(&errors).hypot(between) / (points.len() as f64).sqrt();
+        Self { ln_objects: f64::from(objects).ln(), ratio_ln: median(&ratios).unwrap_or(0.0), error_ln }
     }
 
-    /// Where they cross.
-    ///
-    /// An excursion to one side whose area could be noise in more than one case of a hundred is none: the roots around it count
-    /// as one, or as none where the ratio returns to the side it came from.
-    #[must_use]
-    pub fn outcome(&self) -> PairedOutcome {
-        let mut held: Vec<Excursion> = Vec::new();
-        for excursion in excursions(&self.curve) {
-            if self.ratio.area(excursion.start, excursion.end).in_units_of(DISTINCT).abs() < 1.0 {
-                continue;
-            }
-            match held.last_mut().filter(|last| last.positive == excursion.positive) {
-                // What lay between was not distinct, so both belong to one excursion.
-                Some(last) => last.end = excursion.end,
-                None => held.push(excursion),
-            }
+    /// The ratio in units of what is told from zero at that quantile: -1 or less where the first is distinctly cheaper.
+    fn told(&self, quantile: f64) -> f64 {
+        self.ratio_ln / (quantile * self.error_ln).max(LEAST_LN)
+    }
+}
+
+impl PairedRatio {
+    /// Compares two algorithms at points where both were timed, in any order; a size may have several points. `None`
+    /// with fewer than three sizes that have a pair of samples above zero.
+    pub(crate) fn new(points: &[PairedSamples<'_>]) -> Option<Self> {
+        let mut sizes: BTreeMap<u32, Vec<(f64, f64)>> = BTreeMap::new();
+        for point in points.iter().filter(|p| p.objects > 0) {
+            let pairs = point.first_ns.iter().zip(point.second_ns).filter(|(a, b)| **a > 0 && **b > 0);
+            let ratios: Vec<f64> = pairs.map(|(&a, &b)| (a as f64 / b as f64).ln()).collect();
+            let (Some(ratio), Some(spread)) = (median(&ratios), robust_deviation(&ratios)) else { continue };
+            let error = MEDIAN_OVER_MEAN * spread / (ratios.len() as f64).sqrt();
+            sizes.entry(point.objects).or_default().push((ratio, error));
         }
-        let mut positions: Vec<PairedCrossing> = held.windows(2).map(|w| self.position(&w[0], &w[1])).collect();
-        match (positions.len(), held.first()) {
-            (0, Some(only)) if only.positive => PairedOutcome::AlwaysSecond,
-            (0, Some(_)) => PairedOutcome::AlwaysFirst,
-            (0, None) if self.curve.iter().sum::<f64>() > 0.0 => PairedOutcome::AlwaysSecond,
-            (0, None) => PairedOutcome::AlwaysFirst,
-            (1, _) => PairedOutcome::At(positions.remove(0)),
-            _ => PairedOutcome::Several(positions),
-        }
+        let sizes: Vec<Size> = sizes.iter().map(|(&objects, points)| Size::of(objects, points)).collect();
+        (sizes.len() >= 3).then_some(Self { sizes })
     }
 
-    /// The 90 % interval of a crossover at `objects` that was found otherwise: the sizes around it at which neither is distinctly
-    /// cheaper. Where the wrong one is at `objects`, from there over the sizes up to the crossing and around that. It ends
-    /// with the measured sizes. The first algorithm is the one below the crossover if `first_below`. `None` for a crossover beyond
-    /// the measured sizes.
-    #[must_use]
-    pub fn interval(&self, objects: f64, first_below: bool) -> Option<(f64, f64)> {
-        let grid = &self.ratio.grid;
-        let (&lowest, &highest) = (grid.first()?, grid.last()?);
+    /// Whether the first algorithm is cheaper on average over the sizes.
+    pub(crate) fn first_is_cheaper(&self) -> bool {
+        self.sizes.iter().map(|s| s.ratio_ln).sum::<f64>() < 0.0
+    }
+
+    /// The crossings, ascending: each lies between two sizes of which the first algorithm is distinctly cheaper at one
+    /// and the second at the other.
+    pub(crate) fn crossings(&self) -> Vec<Crossing> {
+        let mut found = Vec::new();
+        let mut last: Option<usize> = None;
+        for (k, size) in self.sizes.iter().enumerate().filter(|(_, size)| size.told(DISTINCT).abs() >= 1.0) {
+            if let Some(from) = last
+                && (self.sizes[from].ratio_ln > 0.0) != (size.ratio_ln > 0.0)
+            {
+                found.push(self.crossing(from, k));
+            }
+            last = Some(k);
+        }
+        found
+    }
+
+    /// The middle one of the roots between two sizes at which opposite algorithms are cheaper.
+    fn crossing(&self, from: usize, to: usize) -> Crossing {
+        let pairs = self.sizes[from..=to].windows(2);
+        let roots: Vec<f64> = pairs
+            .filter(|w| (w[0].ratio_ln > 0.0) != (w[1].ratio_ln > 0.0))
+            .map(|w| between(w[0].ln_objects, w[1].ln_objects, w[0].ratio_ln / (w[0].ratio_ln - w[1].ratio_ln)))
+            .collect();
+        Crossing { objects: roots[roots.len() / 2].exp(), first_below: self.sizes[from].ratio_ln < 0.0 }
+    }
+
+    /// The 90 % interval of a crossover at `objects`, below which the first algorithm is the cheaper one: from where
+    /// that is distinct to where it is distinct that the second one is, or to the smallest or largest size. `None` for
+    /// a crossover beyond the sizes.
+    pub(crate) fn interval(&self, objects: f64) -> Option<(f64, f64)> {
         let at = objects.ln();
-        if !(lowest..=highest).contains(&at) {
+        let (first, last) = (self.sizes.first()?, self.sizes.last()?);
+        if !(first.ln_objects..=last.ln_objects).contains(&at) {
             return None;
         }
-        // At least 1 where the one above is distinctly cheaper, and at most -1 where the one below is.
-        let told = |k: usize| if first_below { self.told[k] } else { -self.told[k] };
-        let edge = |within: usize, beyond: usize| {
-            let (a, b) = (told(within).abs(), told(beyond).abs());
-            // Whoever is ahead on the wrong side is not what ends the interval.
-            let a = if told(within) * told(beyond) > 0.0 { a } else { 0.0 };
-            grid[within] + (grid[beyond] - grid[within]) * (1.0 - a) / (b - a)
+        // Where the ratio becomes distinct on the way from a size to one at which it is.
+        let edge = |within: &Size, beyond: &Size| {
+            let (from, to) = (within.told(NORMAL_90), beyond.told(NORMAL_90));
+            let share = (to.signum() - from) / (to - from);
+            between(within.ln_objects, beyond.ln_objects, share.clamp(0.0, 1.0))
         };
-        // The places around `at`, one and the same where it is a place itself.
-        let (below, above) = (grid.partition_point(|g| *g <= at) - 1, grid.partition_point(|g| *g < at));
-        // On the way from the crossover: over where the wrong one is ahead, then over where nothing is told.
-        let low = match (0..=above).rev().skip_while(|&k| told(k) >= 1.0).find(|&k| told(k).abs() >= 1.0) {
-            None => lowest.exp(),
-            Some(k) if k == above => objects,
-            Some(k) => edge(k + 1, k).exp(),
+        let end = |k: usize| &self.sizes[k];
+        let low = match (0..self.sizes.len()).rev().find(|&k| end(k).ln_objects <= at && end(k).told(NORMAL_90) <= -1.0)
+        {
+            Some(k) if k + 1 < self.sizes.len() => edge(end(k + 1), end(k)).min(at),
+            Some(_) => at,
+            None => first.ln_objects,
         };
-        let high = match (below..grid.len()).skip_while(|&k| told(k) <= -1.0).find(|&k| told(k).abs() >= 1.0) {
-            None => highest.exp(),
-            Some(k) if k == below => objects,
-            Some(k) => edge(k - 1, k).exp(),
+        let high = match (0..self.sizes.len()).find(|&k| end(k).ln_objects >= at && end(k).told(NORMAL_90) >= 1.0) {
+            Some(k) if k > 0 => edge(end(k - 1), end(k)).max(at),
+            Some(_) => at,
+            None => last.ln_objects,
         };
-        // The edge may lie beside `objects`, between the same two places.
-        Some((low.min(objects), high.max(objects)))
-    }
-
-    /// The one crossing between two excursions of opposite sign.
-    fn position(&self, below: &Excursion, above: &Excursion) -> PairedCrossing {
-        let (curve, grid) = (&self.curve, &self.ratio.grid);
-        let crossed = (below.end..above.start).filter(|&k| (curve[k] > 0.0) != (curve[k + 1] > 0.0));
-        let root = |k: usize| grid[k] + (grid[k + 1] - grid[k]) * curve[k] / (curve[k] - curve[k + 1]);
-        let roots: Vec<f64> = crossed.map(root).collect();
-        // Between them lie an odd number of roots; the middle one leaves as much disagreement below as above.
-        let objects = roots.get(roots.len() / 2).copied().unwrap_or(grid[above.start]).exp();
-        let first_below = !below.positive;
-        let (low, high) = self.interval(objects, first_below).unwrap_or((objects, objects));
-        PairedCrossing { objects, low, high, first_below }
+        Some((low.exp(), high.exp()))
     }
 }
 
-/// A stretch of the grid on which the ratio keeps its sign.
-struct Excursion {
-    /// The second algorithm is cheaper.
-    positive: bool,
-    /// First and last place on the grid.
-    start: usize,
-    end: usize,
-}
-
-fn excursions(curve: &[f64]) -> Vec<Excursion> {
-    let mut list: Vec<Excursion> = Vec::new();
-    for (k, &value) in curve.iter().enumerate() {
-        let positive = value > 0.0;
-        match list.last_mut().filter(|last| last.positive == positive) {
-            Some(last) => last.end = k,
-            None => list.push(Excursion { positive, start: k, end: k }),
-        }
-    }
-    list
+fn between(from: f64, to: f64, share: f64) -> f64 {
+    from + (to - from) * share
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::*;
+    use sapwise_scenes::Random;
+
+    /// Two passes over 21 sizes, five frames each, of two algorithms whose ratio is `(n / 1000) ^ exponent` with 3 % of
+    /// noise.
+    fn crossing_at_1000(exponent: f64, seed: u64) -> PairedRatio {
+        let mut random = Random::named(seed, &[]);
+        let mut noisy = |ns: f64| (1e6 * ns * (0.03 * random.normal()).exp()) as u64;
+        let points: Vec<(u32, Vec<u64>, Vec<u64>)> = (0..42)
+            .map(|k| {
+                let n = 10.0_f64.powf(1.0 + f64::from(k % 21) / 4.0).round();
+                let mut frames = |ns: f64| (0..5).map(|_| noisy(ns)).collect::<Vec<_>>();
+                (n as u32, frames((n / 1000.0).powf(exponent)), frames(1.0))
+            })
+            .collect();
+        let samples = points.iter().map(|(objects, first_ns, second_ns)| PairedSamples {
+            objects: *objects,
+            first_ns,
+            second_ns,
+        });
+        PairedRatio::new(&samples.collect::<Vec<_>>()).unwrap()
+    }
+
+    #[test]
+    fn a_crossing_is_found_with_its_side_and_lies_in_its_interval() {
+        for seed in 0..20 {
+            let ratio = crossing_at_1000(1.0, seed);
+            let [found] = ratio.crossings()[..] else { panic!("{seed}: {:?}", ratio.crossings()) };
+            assert!(found.first_below && (found.objects / 1000.0).log2().abs() < 0.1, "{found:?}");
+            let (low, high) = ratio.interval(found.objects).unwrap();
+            assert!(low <= 1050.0 && high >= 950.0 && high < 2.0 * low, "{seed}: {low} to {high}");
+            assert!(!crossing_at_1000(-1.0, seed).crossings()[0].first_below);
+        }
+    }
+
+    #[test]
+    fn equal_costs_do_not_cross_and_have_the_widest_interval() {
+        let found: usize = (0..50).map(|seed| crossing_at_1000(0.0, seed).crossings().len()).sum();
+        assert!(found <= 10, "{found} crossings in 50 comparisons");
+        let (low, high) = crossing_at_1000(0.001, 1).interval(1000.0).unwrap();
+        assert!(low < 300.0 && high > 3000.0, "{low} to {high}");
+    }
+
+    #[test]
+    fn too_few_sizes_and_a_crossover_beyond_them_are_not_told() {
+        let at = |objects| PairedSamples { objects, first_ns: &[2, 2], second_ns: &[1, 1] };
+        assert_eq!(PairedRatio::new(&[at(10), at(30), at(30), at(0)]), None);
+        let apart = PairedRatio::new(&[at(10), at(30), at(90)]).unwrap();
+        assert!(apart.crossings().is_empty() && !apart.first_is_cheaper());
+        assert_eq!((apart.interval(100.0), apart.interval(5.0)), (None, None));
+        let (low, high) = apart.interval(30.0).unwrap();
+        assert!((low - 10.0).abs() < 1e-9 && (high - 30.0).abs() < 1e-9, "{low} to {high}");
+    }
+}

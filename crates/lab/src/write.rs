@@ -6,7 +6,6 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-use tempfile::TempDir;
 
 /// Writes what `write` produces to `path`, so that a reader never sees half of it.
 ///
@@ -33,46 +32,19 @@ pub fn write_text(path: &Path, text: &str) -> Result<()> {
     write_atomically(path, |out| Ok(out.write_all(text.as_bytes())?))
 }
 
-/// What the names of files and folders begin and end with that are there until they are moved to their place.
+/// What the names of files begin and end with that are there until they are moved to their place.
 const TEMPORARY: [&str; 2] = [".sapwise-", ".tmp"];
 
 /// A younger one may belong to a program that has not locked it yet.
 const ABANDONED_AFTER: Duration = Duration::from_secs(60);
 
-/// Whether a file or folder is called as those are that [`write_atomically`] and [`TemporaryFolder`] make.
+/// Whether a file is called as those are that [`write_atomically`] makes until they are whole.
 #[must_use]
-pub fn is_temporary(name: &OsStr) -> bool {
+pub(crate) fn is_temporary(name: &OsStr) -> bool {
     name.to_str().is_some_and(|name| name.starts_with(TEMPORARY[0]) && name.ends_with(TEMPORARY[1]))
 }
 
-/// A folder within another, for files that are moved from there to their places. It is removed with the value.
-#[derive(Debug)]
-pub struct TemporaryFolder {
-    folder: TempDir,
-    _lock: Option<File>,
-}
-
-impl TemporaryFolder {
-    /// One within `folder`. What a program that was killed has left there is removed.
-    ///
-    /// # Errors
-    /// Names `folder`.
-    pub fn within(folder: &Path) -> Result<Self> {
-        remove_abandoned(folder);
-        let made = temporary().tempdir_in(folder).map_err(|e| refused(folder, &e))?;
-        let lock = locked(made.path());
-        Ok(Self { folder: made, _lock: lock })
-    }
-
-    /// Where it is.
-    #[must_use]
-    pub fn path(&self) -> &Path {
-        self.folder.path()
-    }
-}
-
-/// A lock that lasts until the file is closed, as the system does for a program that is killed. Where the system can't lock a folder, or
-/// another program has, there is none: it can't be told for abandoned either.
+/// A lock that lasts until the file is closed, as the system does for a program that is killed. `None` when another program has it.
 fn locked(path: &Path) -> Option<File> {
     File::open(path).ok().filter(|file| file.try_lock().is_ok())
 }
@@ -82,10 +54,10 @@ fn remove_abandoned(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten().filter(|entry| is_temporary(&entry.file_name())) {
         let path = entry.path();
         // Neither a link nor a pipe, which would be waited for, is one of ours.
-        let Some(found) = entry.metadata().ok().filter(|found| found.is_file() || found.is_dir()) else { continue };
+        let Some(found) = entry.metadata().ok().filter(fs::Metadata::is_file) else { continue };
         let old = found.modified().is_ok_and(|at| at.elapsed().is_ok_and(|age| age >= ABANDONED_AFTER));
         if old && locked(&path).is_some() {
-            let _ = if path.is_dir() { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
+            let _ = fs::remove_file(&path);
         }
     }
 }
@@ -177,27 +149,8 @@ mod tests {
         let written = aged(".sapwise-written.tmp");
         written.lock().unwrap();
         File::create(path(".sapwise-young.tmp")).unwrap();
-        let beside = TemporaryFolder::within(folder.path()).unwrap();
-        File::create(beside.path().join("half")).unwrap();
         write_atomically(&path("out"), hello).unwrap();
-        let beside_name = beside.path().file_name().unwrap().to_str().unwrap().to_owned();
-        let mut left = vec![".sapwise-written.tmp", ".sapwise-young.tmp", &beside_name, "mine.tmp", "out"];
-        left.sort_unstable();
-        assert_eq!(names(folder.path()), left);
-        // A folder is no older than what was put into it last.
-        #[cfg(unix)]
-        {
-            let killed = path(".sapwise-folder.tmp");
-            fs::create_dir(&killed).unwrap();
-            File::create(killed.join("half")).unwrap();
-            File::open(&killed).unwrap().set_modified(std::time::SystemTime::now() - 2 * ABANDONED_AFTER).unwrap();
-            File::open(beside.path())
-                .unwrap()
-                .set_modified(std::time::SystemTime::now() - 2 * ABANDONED_AFTER)
-                .unwrap();
-            write_atomically(&path("out"), hello).unwrap();
-            assert_eq!(names(folder.path()), left);
-        }
+        assert_eq!(names(folder.path()), [".sapwise-written.tmp", ".sapwise-young.tmp", "mine.tmp", "out"]);
     }
 
     #[test]

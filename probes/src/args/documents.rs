@@ -1,4 +1,4 @@
-//! The commands in the documents are commands that this program understands.
+//! Tests that this program understands the commands in the documents.
 
 use super::Arguments;
 use clap::Parser;
@@ -15,7 +15,7 @@ const DOCUMENTS: [(&str, &str); 9] = [
     ("BENCHMARKS.md", include_str!("../../../BENCHMARKS.md")),
 ];
 
-/// How a line of a shell calls this program. `own` is the example of a program with an algorithm of its own.
+/// How shell lines call this program. `own` is the example of a program with its own algorithm.
 const CALLS: [&str; 5] = [
     "cargo run --release -p sapwise-cli -- ",
     "cargo run --release -p sapwise-cli --example own_algorithm -- ",
@@ -24,14 +24,14 @@ const CALLS: [&str; 5] = [
     "own ",
 ];
 
-/// The arguments of a line of a shell that calls this program.
+/// Returns the arguments of a shell line that calls this program.
 fn arguments(line: &str) -> Option<Vec<&str>> {
     let words = CALLS.iter().find_map(|call| line.trim_start().strip_prefix(call))?;
     let words = words.split([';', '|', '>', '&']).next()?.split("  #").next()?;
     Some(std::iter::once("sapwise").chain(words.split_whitespace()).collect())
 }
 
-/// The lines within fences of shell, and what stands between backquotes outside of all fences.
+/// Returns the lines of `sh` fences, and the code between backquotes outside of fences.
 fn lines(text: &str) -> Vec<&str> {
     let mut found = Vec::new();
     for (k, part) in text.split("```").enumerate() {

@@ -1,4 +1,4 @@
-//! Values that the command knows, which the help lists.
+//! Values that the help lists or gives a range for.
 
 use clap::builder::{PossibleValue, TypedValueParser};
 use clap::error::Error;
@@ -7,7 +7,7 @@ use sapwise_scenes::Scenario;
 use std::ffi::OsStr;
 use std::ops::RangeInclusive;
 
-/// Reads values as the parser does, with its errors, which say more than that a value is none of a list.
+/// Lists the scenarios in the help, but keeps the errors of the parser, which say more than "not in the list".
 #[derive(Clone)]
 struct Scenarios<P>(P);
 
@@ -23,7 +23,7 @@ impl<P: TypedValueParser> TypedValueParser for Scenarios<P> {
     }
 }
 
-/// A whole number within a range. The texts of the parser for integers name digits and tell no range.
+/// Parses a whole number within a range. The errors of clap's own parser name no range.
 pub(super) fn whole(range: RangeInclusive<u32>) -> impl TypedValueParser<Value = u32> {
     move |text: &str| match text.parse() {
         Ok(number) if range.contains(&number) => Ok(number),
@@ -31,12 +31,12 @@ pub(super) fn whole(range: RangeInclusive<u32>) -> impl TypedValueParser<Value =
     }
 }
 
-/// A scenario.
+/// Parses a scenario.
 pub(super) fn scenario() -> impl TypedValueParser<Value = Scenario> {
     Scenarios(|text: &str| text.parse::<Scenario>())
 }
 
-/// A value that may be a scenario, read by `parser`.
+/// Parses a value that may be a scenario.
 pub(super) fn scenario_or<P: TypedValueParser>(parser: P) -> impl TypedValueParser<Value = P::Value> {
     Scenarios(parser)
 }

@@ -2,7 +2,7 @@
 
 use clap::{Args, Subcommand};
 
-/// One part of a measurement in a process of its own, so that a crash costs that part and not the run.
+/// Runs one part of a measurement in its own process, so that a crash costs that part only.
 #[derive(Debug, Args)]
 pub(crate) struct Part {
     #[command(subcommand)]
@@ -21,25 +21,20 @@ pub(crate) enum PartKind {
     Gpus,
     /// Prints the algorithms on all GPUs, one as JSON a line.
     GpuAlgorithms,
-    /// Prints a GPU with its parameters as JSON.
+    /// Prints a GPU with its parameters, as JSON.
     Gpu {
         index: u32,
         #[arg(long)]
         threads: Option<u32>,
     },
-    /// Prints the parameters of several GPUs together as JSON.
+    /// Prints the parameters of several GPUs that work together, as JSON.
     GpuGroup {
         /// As in `gpu0+1`.
         gpus: sapwise::Backend,
         #[arg(long)]
         threads: Option<u32>,
     },
-    /// Takes the samples that standard input asks for, and prints an answer as JSON a line.
-    Samples {
-        /// What holds for all of them, as JSON.
-        session: String,
-    },
-    /// Sweeps one scenario and prints one event as JSON a line.
+    /// Sweeps one scenario and prints its events, one as JSON a line.
     Sweep {
         /// The request, as JSON.
         request: String,

@@ -59,9 +59,9 @@ pub(crate) struct Probe {
     /// Stop as at Ctrl-C when standard input ends. For a process that starts this one.
     #[arg(long, hide = true, conflicts_with = "profiles")]
     pub(crate) leashed: bool,
-    /// Where the report goes. In a folder that exists it is named after CPU, cores and node, and a good one of this node by the same command is kept:
-    /// `sapwise fleet` reads what many nodes have put there. SAPWISE_NODE tells nodes apart that have one host name. With --profiles a folder. Without
-    /// this option report.json, with --profiles reports/, with --json no file.
+    /// Where the report goes [default: report.json; with --profiles reports/; with --json nowhere]. In a folder that exists its name is
+    /// made of CPU, cores and node, and a good report of this node by the same command is kept: `sapwise check` reads what many nodes
+    /// have put there. SAPWISE_NODE names a node, if several have one host name. With --profiles a folder.
     #[arg(long, value_name = "R.json")]
     pub(crate) out: Option<PathBuf>,
     /// The report on standard output instead of a summary.

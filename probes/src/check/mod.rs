@@ -1,24 +1,23 @@
-//! Checks of a file: whether it is sound, current and applicable here, and what makes it doubtful.
+//! Checks of a file: whether it is sound, current and usable here.
 
-mod figures;
-mod model;
 mod privacy;
 mod report;
 mod tuning;
 
 use crate::algorithms::Algorithms;
 use crate::gpus::{Seen, look};
-use sapwise::measure;
-use sapwise::{Machine, Registry, usable_cores};
+use crate::revisions;
+use sapwise::{Machine, Model, Registry, measure, usable_cores};
 use sapwise_lab::data::{Document, read_document};
+use sapwise_lab::kinds::{Kind, Times, unusable};
 use serde::Serialize;
 use std::cell::{OnceCell, RefCell};
 use std::path::Path;
 
-pub(crate) use figures::{doubts, hardware_disturbed, hardware_doubts};
+pub(crate) use report::{doubts, hardware_doubts};
 
 /// What is known about one file.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub(crate) struct Finding {
     pub(crate) file: String,
     /// `None` when it could not be read.
@@ -31,10 +30,16 @@ pub(crate) struct Finding {
     pub(crate) applicable: Option<bool>,
     /// What makes the file fail.
     pub(crate) problems: Vec<String>,
-    /// What makes its figures doubtful, though it is readable and complete.
+    /// Why its figures should not be relied on, though it is readable and complete.
     pub(crate) doubts: Vec<String>,
     /// What else the user should know.
     pub(crate) notes: Vec<String>,
+    /// The kind of a report.
+    #[serde(skip)]
+    pub(crate) kind: Option<Kind>,
+    /// The times of a report, unless it was cut short or disturbed.
+    #[serde(skip)]
+    pub(crate) times: Option<Times>,
 }
 
 /// What files are checked against.
@@ -53,37 +58,31 @@ impl Here {
 
     /// Reads a file and checks it.
     pub(crate) fn look_at(&self, path: &Path) -> Finding {
-        let mut finding = Finding {
-            file: path.display().to_string(),
-            schema: None,
-            sound: false,
-            current: None,
-            applicable: None,
-            problems: Vec::new(),
-            doubts: Vec::new(),
-            notes: Vec::new(),
-        };
-        // A note and not a line on standard error: what is told of a file belongs to the findings.
+        let mut finding = Finding { file: path.display().to_string(), ..Finding::default() };
+        // A note and not a line on standard error, so that it stands with its file.
         let newer = RefCell::new(Vec::new());
         let read = read_document(path, &|text| newer.borrow_mut().push(text.to_owned()));
         finding.notes.extend(newer.into_inner());
+        finding.sound = read.is_ok();
         match read {
             Err(error) => finding.problems.push(format!("{error:#}")),
-            Ok(document) => {
-                finding.sound = true;
-                match document {
-                    Document::Report(report) => {
-                        // Pipes have no length, and are nobody's contribution.
-                        let bytes = std::fs::metadata(path).map_or(0, |m| m.len());
-                        self.report(&report, bytes, &mut finding);
-                    }
-                    Document::Model(stored) => self.model(&stored, &mut finding),
-                    Document::Tuning(tuning) => self.tuning(&tuning, &mut finding),
-                    _ => finding.problems.push("this version does not check files of this schema".to_owned()),
-                }
+            Ok(Document::Report(report)) => {
+                self.report(&report, &mut finding);
+                finding.kind = Some(Kind::of(&report));
+                finding.times = unusable(&report).is_none().then(|| Times::of(&report));
             }
+            Ok(Document::Model(stored)) => self.model(&stored.model, &mut finding),
+            Ok(Document::Tuning(tuning)) => self.tuning(&tuning, &mut finding),
+            Ok(_) => finding.problems.push("this version does not check files of this schema".to_owned()),
         }
         finding
+    }
+
+    fn model(&self, model: &Model, finding: &mut Finding) {
+        finding.schema = Some("model/3");
+        let used = model.methods.iter().map(|m| ((m.backend, m.method.as_str()), m.revision));
+        finding.set_current(revisions::stale(used, &self.registry), "train it again on new reports");
+        finding.applicable = finding.current;
     }
 
     /// The GPUs of this machine.
@@ -97,13 +96,8 @@ impl Here {
 
 impl Finding {
     /// The name of the schema without its version: `report`.
-    pub(crate) fn kind(&self) -> Option<&'static str> {
+    pub(crate) fn schema_name(&self) -> Option<&'static str> {
         self.schema.and_then(|schema| schema.split('/').next())
-    }
-
-    /// Whether it is a report that was cut short.
-    pub(crate) fn is_cut_short(&self) -> bool {
-        self.doubts.iter().any(|doubt| doubt.starts_with(figures::CUT_SHORT))
     }
 
     fn set_current(&mut self, stale: Vec<String>, remedy: &str) {

@@ -2,21 +2,17 @@
 
 use super::outcome::Outcome;
 use super::settings::ReplaySettings;
-use sapwise_lab::figures::ReplayPicture;
+use sapwise_lab::figures::Replay;
 
-/// What the picture of a replay shows.
-pub(crate) fn picture(settings: &ReplaySettings, outcome: &Outcome) -> ReplayPicture {
+/// The picture of a replay, with paragraphs below it.
+pub(crate) fn picture(settings: &ReplaySettings, outcome: &Outcome, caption: Vec<String>) -> Replay {
     let frames = &outcome.frames;
-    let taken = outcome.last_taken();
-    ReplayPicture {
-        name: settings.source.name().to_owned(),
-        algorithms: outcome.fixed.clone(),
-        fixed_ns: (0..outcome.fixed.len()).map(|k| frames.iter().map(|f| f.fixed_ns[k]).collect()).collect(),
-        adaptive_ns: frames.iter().map(|f| f.adaptive_ns).collect(),
-        objects: frames.iter().map(|f| f.objects).collect(),
-        ran: taken.iter().map(|t| t.chosen).collect(),
-        explored: taken.iter().map(|t| t.explored).collect(),
-        switches: outcome.switches(),
-        co_runner_from: settings.co_runner.map(|c| c.from_frame),
+    let times = |k: usize| frames.iter().map(|f| f.fixed_ns[k]).collect();
+    Replay {
+        title: settings.source.name().to_owned(),
+        chosen_ns: frames.iter().map(|f| f.adaptive_ns).collect(),
+        chosen: outcome.last_taken().iter().map(|t| t.chosen).collect(),
+        fixed: outcome.fixed.iter().enumerate().map(|(k, id)| (id.to_string(), times(k))).collect(),
+        caption,
     }
 }

@@ -10,4 +10,4 @@ mod verify;
 
 pub(crate) use request::SweepRequest;
 pub(crate) use runner::{Conditions, Found, sweep_all};
-pub(crate) use scenario::{PAIR_LIMIT, add_gpus, sweep};
+pub(crate) use scenario::sweep;

@@ -11,7 +11,7 @@ use sapwise_scenes::Scenario;
 use std::time::{Duration, Instant};
 
 /// Most pairs in a frame, 8 bytes each: 256 MB, and as much again in the threads of an algorithm.
-pub(crate) const PAIR_LIMIT: usize = 32 << 20;
+const PAIR_LIMIT: usize = 32 << 20;
 
 /// Runs the algorithms of a registry through the schedule of a request and hands on each event.
 ///
@@ -133,7 +133,7 @@ impl ScenarioSweep<'_> {
 }
 
 /// Adds the algorithms on those of these GPUs that are still there, and returns what keeps others from running.
-pub(crate) fn add_gpus(registry: &mut Registry, wanted: &[GpuIdentity]) -> Vec<String> {
+fn add_gpus(registry: &mut Registry, wanted: &[GpuIdentity]) -> Vec<String> {
     if wanted.is_empty() {
         return Vec::new();
     }

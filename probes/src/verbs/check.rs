@@ -1,4 +1,4 @@
-//! `sapwise check`: whether files are sound, current and applicable here.
+//! `sapwise check`: whether files are sound, current and usable here, and how far repeated reports agree.
 
 use crate::algorithms::Algorithms;
 use crate::args::Check;
@@ -7,79 +7,185 @@ use crate::exit::Outcome;
 use crate::progress::Progress;
 use crate::terminal::Terminal;
 use crate::{output, shell};
+use sapwise_lab::data::report_files;
+use sapwise_lab::kinds::{Agreement, Kind, Times};
+use sapwise_lab::text::count;
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::path::PathBuf;
+
+/// Times over those of repeats above which a report is not like them. Undisturbed repeats differ by 2 %, a program that
+/// takes memory or cache makes it 0 to 36 %.
+const SLOW: f64 = 1.15;
 
 /// The answer for machines.
 #[derive(Serialize)]
 struct Answer {
     files: Vec<Finding>,
+    /// The kinds of the reports, in the order of the files.
+    kinds: Vec<OfKind>,
+}
+
+/// The reports of one kind.
+#[derive(Serialize)]
+struct OfKind {
+    #[serde(flatten)]
+    kind: Kind,
+    reports: Vec<Repeat>,
+}
+
+/// A report among those of its kind.
+#[derive(Serialize)]
+struct Repeat {
+    file: String,
+    /// Its times over those of the others; null without others that were neither cut short nor disturbed.
+    over_others: Option<Agreement>,
 }
 
 pub(crate) fn run(arguments: &Check, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
     let here = Here::new(algorithms);
-    let progress = Progress::new(arguments.files.len() as u64);
+    let paths = files(&arguments.files)?;
+    let progress = Progress::new(paths.len() as u64);
     progress.message("reading");
     let look_at = |path: &PathBuf| {
         let finding = here.look_at(path);
         progress.advance(1);
         finding
     };
-    let files: Vec<Finding> = arguments.files.iter().map(look_at).collect();
+    let mut files: Vec<Finding> = paths.iter().map(look_at).collect();
     drop(progress);
+    let kinds = compare(&mut files);
     let failed = files.iter().any(|f| !f.problems.is_empty());
     if arguments.json {
-        output::print_json(&Answer { files })?;
+        output::print_json(&Answer { files, kinds })?;
     } else {
-        let terminal = Terminal::of_standard_output();
-        files.iter().try_for_each(|f| output::print(&text(f, terminal)))?;
-        output::print(&format!("Next: {}", next_step(&files)))?;
+        output::print(&(text(&files, &kinds, Terminal::of_standard_output()) + &next_step(&files, &arguments.files)))?;
     }
     Ok(if failed { Outcome::Failed } else { Outcome::Done })
 }
 
-/// The next command to try: for the files with problems, else for all files of the kind of the first.
-fn next_step(files: &[Finding]) -> String {
-    // One that was cut short is to be measured again, as one with a problem.
-    let is_bad = |f: &&Finding| !f.problems.is_empty() || f.is_cut_short();
-    let is_old = |f: &&Finding| f.problems.iter().any(|p| p.contains("`sapwise convert"));
-    if files.iter().any(|f| is_old(&f)) {
-        return format!("sapwise convert {} --out converted", names(files.iter().filter(is_old)));
+/// The files, and those of folders. A path that can't be read stays, so that its finding says why.
+fn files(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
+    let mut files: Vec<PathBuf> = Vec::new();
+    for path in paths {
+        files.extend(if path.is_dir() { report_files(std::slice::from_ref(path))? } else { vec![path.clone()] });
     }
-    let bad = files.iter().find(is_bad);
-    let Some(file) = bad.or(files.first()) else { return "sapwise predict".to_owned() };
-    let (name, kind) = (shell::quoted(&file.file), file.kind());
-    match (bad.is_some(), kind) {
+    // A file that is given twice would agree with itself.
+    let mut seen = BTreeSet::new();
+    files.retain(|file| seen.insert(file.canonicalize().unwrap_or_else(|_| file.clone())));
+    Ok(files)
+}
+
+/// Sorts reports into kinds and compares each with the others of its kind. One that is slower than they are becomes
+/// doubtful.
+fn compare(files: &mut [Finding]) -> Vec<OfKind> {
+    let mut kinds: Vec<(Kind, Vec<usize>)> = Vec::new();
+    for (k, kind) in files.iter().enumerate().filter_map(|(k, f)| Some((k, f.kind.as_ref()?))) {
+        match kinds.iter_mut().find(|known| known.0 == *kind) {
+            Some(known) => known.1.push(k),
+            None => kinds.push((kind.clone(), vec![k])),
+        }
+    }
+    let mut compared = Vec::new();
+    for (kind, members) in kinds {
+        let agreement = |own: usize| {
+            let others = members.iter().filter(|&&k| k != own).filter_map(|&k| files[k].times.as_ref());
+            files[own].times.as_ref()?.over(&others.collect::<Vec<&Times>>())
+        };
+        let found: Vec<(usize, Option<Agreement>)> = members.iter().map(|&k| (k, agreement(k))).collect();
+        let mut reports = Vec::new();
+        for (k, over_others) in found {
+            let slow = over_others.map(|a| a.median).filter(|&ratio| ratio > SLOW);
+            files[k].doubts.extend(slow.map(|ratio| {
+                format!(
+                    "it takes {ratio:.2} × the time of the other reports of its kind: look for throttling, other \
+                     programs or another setup"
+                )
+            }));
+            reports.push(Repeat { file: files[k].file.clone(), over_others });
+        }
+        compared.push(OfKind { kind, reports });
+    }
+    compared
+}
+
+fn text(files: &[Finding], kinds: &[OfKind], terminal: Terminal) -> String {
+    let reports = kinds.iter().map(|kind| kind.reports.len()).sum::<usize>();
+    // Of many reports the table says what is good.
+    let is_told = |f: &&Finding| reports < 2 || f.kind.is_none() || !f.problems.is_empty() || !f.doubts.is_empty();
+    let mut text: String = files.iter().filter(is_told).map(|f| of_file(f, terminal)).collect();
+    if reports > 1 {
+        text += &format!("\n{}", table(files, kinds, terminal));
+    }
+    text
+}
+
+fn of_file(finding: &Finding, terminal: Terminal) -> String {
+    let schema = finding.schema.map_or(String::new(), |s| format!(" {s}"));
+    let mut text = format!("{}:{schema} {}\n", finding.file, verdict(finding, terminal));
+    let mut list = |what: String, lines: &[String]| {
+        lines.iter().for_each(|line| text.push_str(&format!("  {what} {line}\n")));
+    };
+    list(terminal.bad("problem:"), &finding.problems);
+    list(terminal.warning("doubt:"), &finding.doubts);
+    list(terminal.warning("note:"), &finding.notes);
+    text
+}
+
+fn verdict(finding: &Finding, terminal: Terminal) -> String {
+    match (&finding.problems[..], &finding.doubts[..]) {
+        ([], []) => terminal.good("good"),
+        ([], _) => terminal.warning("DOUBTFUL"),
+        _ => terminal.bad("BAD"),
+    }
+}
+
+/// Which reports can be believed, which are of one kind, and how far repeats agree.
+fn table(files: &[Finding], kinds: &[OfKind], terminal: Terminal) -> String {
+    let mut rows = vec![["report", "kind", "believed", "times over repeats", "quartiles"].map(str::to_owned).to_vec()];
+    for (k, kind) in kinds.iter().enumerate() {
+        for Repeat { file, over_others } in &kind.reports {
+            let finding = files.iter().find(|f| f.file == *file);
+            let ratio = over_others.map_or("-".to_owned(), |a| format!("{:.2}", a.median));
+            let quartiles = over_others.map_or("-".to_owned(), |a| {
+                let [low, high] = a.quartiles;
+                format!("{low:.2} to {high:.2}")
+            });
+            let believed = finding.map_or_else(String::new, |f| verdict(f, terminal));
+            rows.push(vec![file.clone(), (k + 1).to_string(), believed, ratio, quartiles]);
+        }
+    }
+    let good = files.iter().filter(|f| f.kind.is_some() && f.problems.is_empty() && f.doubts.is_empty()).count();
+    let kinds: String =
+        kinds.iter().enumerate().map(|(k, of)| format!("Kind {}: {}\n", k + 1, words(&of.kind))).collect();
+    format!("{}\n{kinds}{good} of {} can be believed.\n", terminal.table(&rows), count(rows.len() - 1, "report"))
+}
+
+fn words(kind: &Kind) -> String {
+    let Kind { cpu, cores, simd, host, .. } = kind;
+    let gpus = if kind.gpus.is_empty() { "no GPU".to_owned() } else { kind.gpus.join(", ") };
+    let gpu_threads = kind.gpu_threads.map_or(String::new(), |k| format!(" on {}", count(k as usize, "thread")));
+    format!("{cpu}, {}, {simd}, {gpus}{gpu_threads}; host {host}", count(*cores as usize, "core"))
+}
+
+/// The next command to try: for the first file with a problem or a doubt, else for the first file or for all reports.
+fn next_step(files: &[Finding], given: &[PathBuf]) -> String {
+    let bad = files.iter().find(|f| !f.problems.is_empty() || !f.doubts.is_empty());
+    let Some(file) = bad.or(files.first()) else { return "Next: sapwise predict".to_owned() };
+    let name = shell::quoted(&file.file);
+    let reports = || -> String {
+        if files.iter().all(|f| f.kind.is_some()) {
+            return given.iter().map(|path| shell::path(path) + " ").collect();
+        }
+        files.iter().filter(|f| f.kind.is_some()).map(|f| shell::quoted(&f.file) + " ").collect()
+    };
+    let next = match (bad.is_some(), file.schema_name()) {
         (true, Some("model")) => "sapwise predict".to_owned(),
         (true, Some("tuning")) => "sapwise predict --out tuning.json".to_owned(),
         (true, _) => "sapwise probe --out report.json".to_owned(),
         (false, Some("model")) => format!("sapwise predict --model {name}"),
         (false, Some("tuning")) => format!("sapwise run fragmentation --tuning {name}"),
-        (false, _) => format!("sapwise study {} --out study", names(files.iter().filter(|f| f.kind() == kind))),
-    }
-}
-
-/// The files as words of a command.
-fn names<'a>(files: impl Iterator<Item = &'a Finding>) -> String {
-    files.map(|f| shell::quoted(&f.file)).collect::<Vec<_>>().join(" ")
-}
-
-fn text(finding: &Finding, terminal: Terminal) -> String {
-    let state = match (&finding.problems[..], &finding.doubts[..]) {
-        ([], []) => terminal.good("good"),
-        ([], _) => terminal.warning("DOUBTFUL"),
-        _ => terminal.bad("BAD"),
+        (false, _) => format!("sapwise study {}--out study", reports()),
     };
-    let schema = finding.schema.map_or(String::new(), |s| format!(" {s}"));
-    let mut text = format!("{}:{schema} {state}", finding.file);
-    for problem in &finding.problems {
-        text.push_str(&format!("\n  {} {problem}", terminal.bad("problem:")));
-    }
-    for doubt in &finding.doubts {
-        text.push_str(&format!("\n  {} {doubt}", terminal.warning("doubt:")));
-    }
-    for note in &finding.notes {
-        text.push_str(&format!("\n  {} {note}", terminal.warning("note:")));
-    }
-    text
+    format!("Next: {next}")
 }

@@ -16,9 +16,9 @@ use serde::Serialize;
 struct Answer {
     algorithms: Vec<Algorithm>,
     adapters: Vec<GpuIdentity>,
-    /// What went wrong while looking for GPUs.
+    /// Why no GPUs could be looked for, if they could not.
     remark: Option<String>,
-    /// The adapters that execute nothing, each in a sentence.
+    /// Adapters that execute nothing, one sentence each.
     inert: Vec<String>,
 }
 
@@ -27,7 +27,7 @@ struct Algorithm {
     id: String,
     revision: u32,
     available: bool,
-    /// Why it is not available.
+    /// Why it is not available, if it is not.
     reason: Option<String>,
 }
 
@@ -47,8 +47,8 @@ pub(crate) fn run(arguments: &Devices, known: &Algorithms) -> anyhow::Result<Out
     Ok(Outcome::Done)
 }
 
-/// Those of the CPU, then those of the GPUs that were seen; and of which GPUs it was seen that they execute nothing. Drivers are loaded into
-/// processes of their own only.
+/// Returns the algorithms on the CPU and on the GPUs, and a sentence for each GPU that executes nothing. Only other
+/// processes load drivers.
 ///
 /// # Errors
 /// When no process can be started.
@@ -102,7 +102,7 @@ fn text(answer: &Answer, no_gpus: bool, terminal: Terminal) -> String {
     text + "\nNext: sapwise predict"
 }
 
-/// Nothing without GPUs.
+/// Draws the GPUs as a table; nothing without any.
 fn gpu_table(adapters: &[GpuIdentity], terminal: Terminal) -> String {
     if adapters.is_empty() {
         return String::new();

@@ -14,10 +14,7 @@ use sapwise_scenes::{Frames, write_pairs};
 use serde::Serialize;
 use std::time::Instant;
 
-/// What is run when the user names nothing.
-const DEFAULT: &str = "grid-sap@cpu1";
-
-/// The limit on the pairs where the free memory is unknown or next to nothing: a small scene must pass all the same.
+/// The lowest limit on pairs that follows from the free memory: a small scene must always pass.
 const FEWEST_PAIRS: usize = 1 << 20;
 
 /// The answer for machines.
@@ -29,7 +26,7 @@ struct Answer {
     /// Of each frame.
     pairs: Vec<u64>,
     median_ms: f64,
-    /// Of every frame, then of every frame of the next repetition.
+    /// Of each frame, repetition after repetition.
     samples_ms: Vec<f64>,
     /// Of the last frame.
     fingerprint: String,
@@ -39,13 +36,13 @@ pub(crate) fn run(arguments: &Arguments, algorithms: &Algorithms) -> anyhow::Res
     outputs::check(std::slice::from_ref(&arguments.boxes), &arguments.out.iter().collect::<Vec<_>>())?;
     let mut registry = algorithms.registry(usable_cores());
     registry.pin_threads();
-    let id = algorithm(arguments, &registry)?;
-    add_gpus(&mut registry, &id)?;
+    let id = &arguments.algorithm;
+    add_gpus(&mut registry, id)?;
     let frames = Frames::read(&arguments.boxes)?;
     interrupt::listen()?;
     let mut pairs = Pairs::new();
     pairs.set_limit(Some(arguments.limit.unwrap_or_else(|| memory_limit(id.threads()))));
-    let mut algorithm = registry.create(&id).map_err(|error| refused(&id, &error))?;
+    let mut algorithm = registry.create(id).map_err(|error| refused(id, &error))?;
     let (counts, samples_ns) = measure(arguments, &frames, &mut *algorithm, &mut pairs)?;
     let fingerprint = format!("{:016x}", pairs.fingerprint());
     if let Some(path) = &arguments.out {
@@ -71,29 +68,20 @@ pub(crate) fn run(arguments: &Arguments, algorithms: &Algorithms) -> anyhow::Res
     Ok(Outcome::Done)
 }
 
-/// Pairs that fit into half of the memory that is free now: a scene in which all boxes overlap then ends with an error that
-/// counts them, and not with the process killed for want of memory.
+/// Returns the pairs that fit into half of the free memory: a scene in which all boxes overlap then ends with an error,
+/// not with the process killed.
 fn memory_limit(threads: u32) -> usize {
     let Ok(mut system) = sysinfo::System::new() else { return FEWEST_PAIRS };
     system.refresh_memory();
-    // The free memory of a cgroup does not count its page cache as free; what the processes don't hold is.
+    // A cgroup counts its page cache as used memory, though the system would free it.
     let ours = system.cgroup_limits().map_or(u64::MAX, |c| c.total_memory.saturating_sub(c.rss));
     let free = system.available_memory().min(ours);
-    // Each thread has eight lists of its own beside the common one, and the written file is sorted in a copy.
+    // Each thread has eight lists beside the common one, and the output is sorted in a copy.
     let lists = 8 * u64::from(threads) + 2;
     usize::try_from(free / 2 / 8 / lists).unwrap_or(usize::MAX).max(FEWEST_PAIRS)
 }
 
-fn algorithm(arguments: &Arguments, registry: &Registry) -> anyhow::Result<AlgorithmId> {
-    if let Some(id) = &arguments.algorithm {
-        return Ok(id.clone());
-    }
-    let available = registry.available();
-    let usual = available.iter().find(|e| e.id.to_string() == DEFAULT).or(available.last());
-    Ok(usual.context("this build has no algorithm that runs here")?.id.clone())
-}
-
-/// Why an algorithm that was asked for can't be had. The library's advice for too many threads is for programs.
+/// Returns why an algorithm can't be created, without the library's advice for programs.
 fn refused(id: &AlgorithmId, error: &sapwise::Error) -> WrongUsage {
     match error {
         sapwise::Error::Unavailable { reason: Unavailable::TooFewCores { threads, most }, .. } => WrongUsage(format!(
@@ -104,10 +92,10 @@ fn refused(id: &AlgorithmId, error: &sapwise::Error) -> WrongUsage {
     }
 }
 
-/// Adds the algorithms on GPUs where one is asked for.
+/// Adds the algorithms on GPUs if `id` is one.
 ///
 /// # Errors
-/// When this machine lacks a GPU that is asked for, or its drivers can't be loaded.
+/// When this machine lacks a GPU of `id`, or its drivers can't be loaded.
 fn add_gpus(registry: &mut Registry, id: &AlgorithmId) -> anyhow::Result<()> {
     let indices = gpus::uses(id);
     if indices.is_empty() {
@@ -121,7 +109,8 @@ fn add_gpus(registry: &mut Registry, id: &AlgorithmId) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The pairs of every frame, and the samples in nanoseconds of all repetitions. The last frame stays in `pairs`.
+/// Returns the number of pairs of each frame, and the nanoseconds of each frame of all repetitions. `pairs` keeps the
+/// last frame.
 fn measure(
     arguments: &Arguments,
     frames: &Frames,
@@ -173,7 +162,6 @@ fn next_step(arguments: &Arguments, frames: usize) -> String {
     let boxes = shell::path(&arguments.boxes);
     let written = arguments.out.as_ref().map(|path| format!("\nWritten to {}.", path.display())).unwrap_or_default();
     let next = match (&arguments.out, frames) {
-        // A stream of one frame shows no choice.
         (_, 2..) => format!("sapwise run {boxes}"),
         (None, _) => format!("sapwise pairs {boxes} --out pairs.npy"),
         (Some(_), _) => "sapwise devices".to_owned(),

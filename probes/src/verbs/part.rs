@@ -4,15 +4,12 @@ use crate::algorithms::Algorithms;
 use crate::args::{Part, PartKind};
 use crate::exit::{Outcome, WrongUsage};
 use crate::sweep::{SweepRequest, sweep};
-use crate::{child, gpus, output, samples};
+use crate::{child, gpus, output};
 use sapwise::Backend;
 use sapwise::measure::{self, Family, Options};
 
 pub(crate) fn run(arguments: Part, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
-    // The sampler reads requests from the pipe; the other parts only wait for its end.
-    if !matches!(arguments.part, PartKind::Samples { .. }) {
-        child::end_with_parent();
-    }
+    child::end_with_parent();
     match arguments.part {
         PartKind::Hardware { family, threads } => {
             let family: Family = family.parse().map_err(|e: sapwise::UnknownName| WrongUsage(e.to_string()))?;
@@ -26,10 +23,6 @@ pub(crate) fn run(arguments: Part, algorithms: &Algorithms) -> anyhow::Result<Ou
             gpus::print_group(&indices, &Options::default().with_threads(threads))?;
         }
         PartKind::GpuGroup { gpus, .. } => return Err(WrongUsage(format!("{gpus} is no group of GPUs")).into()),
-        PartKind::Samples { session } => {
-            let session = serde_json::from_str(&session).map_err(|e| WrongUsage(format!("the session: {e}")))?;
-            samples::sample(&session, algorithms)?;
-        }
         PartKind::Sweep { request } => {
             let request: SweepRequest =
                 serde_json::from_str(&request).map_err(|e| WrongUsage(format!("the request: {e}")))?;

@@ -3,17 +3,15 @@
 use super::predict_kinds;
 use crate::algorithms::Algorithms;
 use crate::args::Predict;
-use crate::check::{doubts, hardware_disturbed, hardware_doubts};
+use crate::check::hardware_doubts;
 use crate::exit::Outcome;
 use crate::hardware::{self, measure_hardware};
 use crate::prediction::{self, Slice};
 use crate::terminal::Terminal;
-use crate::{interrupt, output, outputs, revisions, shell, summary};
+use crate::{interrupt, output, outputs, shell, summary};
 use anyhow::{Context, bail};
-use sapwise::{Model, Tuning, json, usable_cores};
-use sapwise_lab::data::usual_scenario;
+use sapwise::json;
 use sapwise_lab::data::{Document, read_document};
-use sapwise_lab::fit::measured_tuning;
 use sapwise_lab::report::Report;
 use sapwise_lab::write::write_text;
 use sapwise_scenes::Scenario;
@@ -34,48 +32,35 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
     let mut text = String::new();
     // A sentence on GPUs for people, and their failures for the file.
     let (mut told, mut remarks) = (None, Vec::new());
-    // Whether a sample returned wrong pairs.
-    let mut wrong = false;
     let mut tuning = match &report {
         Some(report) => {
             if !arguments.measured {
                 let all = report.hardware.gpus.iter().map(|g| g.gpu.clone());
                 told = arguments.gpus.tell(&all.filter(|g| !arguments.gpus.takes(g)).collect::<Vec<_>>());
             }
-            of_report(report, arguments, &model, algorithms)?
+            prediction::of_report(report, arguments, &model, algorithms)?
         }
         None => {
             let (hardware, measured) = measure_hardware(arguments.threads, &arguments.gpus)?;
             text = format!("{}\n", summary::hardware(&hardware, terminal));
-            remarks = hardware_doubts(&hardware);
-            remarks.extend(hardware_disturbed(&hardware));
+            remarks = [hardware_doubts(&hardware), hardware.disturbed()].concat();
             interrupt::check()?;
             told = summary::gpus_left_out(&arguments.gpus, &hardware, &measured.left_out, &measured.remarks);
             remarks.extend(measured.remarks);
             let (gpus, slice) = (measured.usable, Slice::of(arguments.scenario.unwrap_or(Scenario::Uniform))?);
-            if arguments.samples > 0 {
-                let sampled =
-                    prediction::predict_and_sample(&model, &hardware, &gpus, &slice, algorithms, arguments.samples)?;
-                wrong = sampled.1;
-                sampled.0
-            } else {
-                prediction::predict(&model, &hardware, &gpus, &slice, algorithms)?
-            }
+            prediction::predict(&model, &hardware, &gpus, &slice, algorithms)?
         }
     };
     tuning.warnings.append(&mut remarks);
     if let Some(path) = &arguments.out {
         write_text(path, &json::write_tuning(&tuning)?)?;
     }
-    let outcome = if wrong || interrupt::requested() { Outcome::Failed } else { Outcome::Done };
+    let outcome = if interrupt::requested() { Outcome::Failed } else { Outcome::Done };
     if arguments.json {
         output::print_file(&json::write_tuning(&tuning)?)?;
         return Ok(outcome);
     }
     text += &summary::tuning(&tuning, terminal);
-    if report.is_some() && arguments.samples > 0 {
-        text += "\nNo sample was taken: samples are timed on this machine, and the prediction is for the machine of the report.\n";
-    }
     if let Some(told) = told {
         text += &format!("\n{told}\n");
     }
@@ -87,39 +72,6 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
     };
     output::print(&text)?;
     Ok(outcome)
-}
-
-/// The tuning of the machine of a report, with what is doubtful about it.
-pub(super) fn of_report(
-    report: &Report,
-    arguments: &Predict,
-    model: &Model,
-    algorithms: &Algorithms,
-) -> anyhow::Result<Tuning> {
-    let mut tuning = if arguments.measured {
-        let mut report = report.clone();
-        arguments.gpus.restrict(&mut report);
-        let scenario = arguments.scenario.map(|s| s.to_string());
-        measured_tuning(&report, scenario.as_deref().unwrap_or_else(|| usual_scenario(&report)), Some(model))?
-    } else {
-        let gpus = report.hardware.gpus.iter().map(|g| g.gpu.clone());
-        let taken: Vec<_> = gpus.filter(|g| arguments.gpus.takes(g)).collect();
-        let slice = Slice::of(arguments.scenario.unwrap_or(Scenario::Uniform))?;
-        let mut tuning = prediction::predict(model, &report.hardware, &taken, &slice, algorithms)?;
-        // No sample is taken of it: it may be another machine than this one.
-        prediction::advise(
-            &mut tuning,
-            "the machine of the report is unlike those of training: predict with --measured from a report that `sapwise probe` has made there",
-        );
-        tuning
-    };
-    // What a model predicts does not rest on the timings of the report.
-    if arguments.measured {
-        let stale = revisions::stale_in_report(report, &algorithms.registry(usable_cores()));
-        tuning.warnings.extend(stale.into_iter().map(|why| format!("the report is stale: {why}; probe again")));
-    }
-    tuning.warnings.extend(doubts(report).into_iter().map(|doubt| format!("the report is doubtful: {doubt}")));
-    Ok(tuning)
 }
 
 fn read_report(path: &Path) -> anyhow::Result<Report> {

@@ -1,35 +1,26 @@
-//! `sapwise predict --report FOLDER`: a tuning for each kind of machine among reports.
+//! `sapwise predict --report FOLDER`: one tuning for each kind of machine in a folder of reports.
 
-use super::predict::of_report;
 use crate::algorithms::Algorithms;
 use crate::args::Predict;
 use crate::exit::{Outcome, WrongUsage};
 use crate::progress::Progress;
 use crate::terminal::Terminal;
 use crate::{interrupt, output, outputs, prediction, shell};
-use anyhow::{Context, bail};
+use anyhow::Context;
 use sapwise::{GpuIdentity, json};
 use sapwise_lab::data::read_reports;
-use sapwise_lab::fleet::{Fleet, Kind, Node};
-use sapwise_lab::report::{Report, Restricted};
+use sapwise_lab::kinds::{Kind, Times, unusable};
+use sapwise_lab::report::Report;
 use sapwise_lab::text::count;
 use sapwise_lab::write::write_text;
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// A report with the name of its file.
-type Named = (String, Report);
-
-/// The report that stands for a kind of machine.
-struct Choice<'a> {
-    kind: Kind,
-    /// `None` where none can be believed.
-    best: Option<(Node, &'a Named)>,
-}
-
 pub(super) fn run(folder: &Path, arguments: &Predict, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
     let Some(out) = arguments.out.as_deref().filter(|_| !arguments.json) else {
-        let why = "the reports of a folder may be of several kinds of machines: name a folder for their tunings with --out, without --json";
+        let why = "the reports of a folder may be of several kinds of machines: name a folder for their tunings with --out, \
+                   without --json";
         return Err(WrongUsage(why.to_owned()).into());
     };
     if out.canonicalize().is_ok_and(|out| folder.canonicalize().is_ok_and(|folder| folder == out)) {
@@ -45,55 +36,61 @@ pub(super) fn run(folder: &Path, arguments: &Predict, algorithms: &Algorithms) -
     let terminal = Terminal::of_standard_output();
     let mut rows = vec![["tuning", "machine", "from", ""].map(str::to_owned).to_vec()];
     let mut without = 0;
-    for (file, Choice { kind, best }) in choose(&reports, arguments) {
+    for (file, (kind, best)) in choose(&reports, arguments) {
         interrupt::check()?;
         let machine = format!("{}, {}, {}", kind.cpu, count(kind.cores as usize, "core"), kind.simd);
-        let Some((_, (name, report))) = best else {
+        let Some((name, report)) = best.map(|k| &reports[k]) else {
             without += 1;
-            let why = "none of its reports can be believed; `sapwise fleet` tells why";
+            let why = "all of its reports were cut short or disturbed";
             rows.push(vec![file, machine, "-".to_owned(), terminal.bad(why)]);
             continue;
         };
-        let tuning = of_report(report, arguments, &model, algorithms).with_context(|| name.clone())?;
+        let tuning = prediction::of_report(report, arguments, &model, algorithms).with_context(|| name.clone())?;
         write_text(&out.join(&file), &json::write_tuning(&tuning)?)?;
         let told = tuning.warnings.first().map_or(terminal.good("good"), |why| terminal.warning(why));
         rows.push(vec![file, machine, name.clone(), told]);
-    }
-    if rows.len() == 1 {
-        bail!("none of the reports in {} is of a machine with all it has", folder.display());
     }
     let mut text = terminal.table(&rows);
     let written = rows.len() - 1 - without;
     text += &format!("\n{} written to {}.\n", count(written, "tuning"), out.display());
     text += "A program reads the one that Machine::tuning_file names and passes it to Adaptive::new.\n";
-    text += &format!("Next: sapwise fleet {}", shell::path(folder));
+    text += &format!("Next: sapwise check {}", shell::path(folder));
     output::print(&text)?;
     Ok(if without == 0 { Outcome::Done } else { Outcome::Failed })
 }
 
-/// For each file name the kind of machine and the report that stands for it: of those that can be believed the one whose times are nearest to
-/// those of its kind. What was measured beside other programs on purpose stands for no machine that a program will start on.
-fn choose<'a>(reports: &'a [Named], arguments: &Predict) -> BTreeMap<String, Choice<'a>> {
-    let fleet = Fleet::of(reports);
-    let off = |node: &Node| node.over_its_kind.map_or(0.0, |ratio| ratio.ln().abs());
-    // The kinds stand in the order of how many nodes they have. Hosts that only their clock tells apart have one file: the first such kind's.
-    let mut chosen: BTreeMap<String, Choice<'_>> = BTreeMap::new();
-    for node in &fleet.nodes {
-        let kind = &fleet.kinds[node.kind];
-        let beside = |what: &Restricted| matches!(what, Restricted::ContendedMemory | Restricted::ContendedCache);
-        if kind.taken.iter().any(beside) {
-            continue;
-        }
-        let Some(named) = reports.iter().find(|(name, _)| *name == node.file) else { continue };
-        let hardware = &named.1.hardware;
+/// For each file name the kind of machine, and its report whose times are nearest to those of the others, if it has any
+/// that was neither cut short nor disturbed.
+///
+/// Hosts that only their clock tells apart have one file: that of the kind with the most reports.
+fn choose(reports: &[(String, Report)], arguments: &Predict) -> BTreeMap<String, (Kind, Option<usize>)> {
+    let mut kinds: BTreeMap<Kind, Vec<usize>> = BTreeMap::new();
+    for (k, (_, report)) in reports.iter().enumerate() {
+        kinds.entry(Kind::of(report)).or_default().push(k);
+    }
+    let mut kinds: Vec<(Kind, Vec<usize>)> = kinds.into_iter().collect();
+    kinds.sort_by_key(|(_, members)| Reverse(members.len()));
+    let mut chosen: BTreeMap<String, (Kind, Option<usize>)> = BTreeMap::new();
+    for (kind, members) in kinds {
+        let hardware = &reports[members[0]].1.hardware;
         let gpus: Vec<GpuIdentity> =
             hardware.gpus.iter().map(|g| g.gpu.clone()).filter(|g| arguments.gpus.takes(g)).collect();
         let file = hardware.machine.tuning_file(kind.cores, &gpus);
-        let choice = chosen.entry(file).or_insert_with(|| Choice { kind: kind.clone(), best: None });
-        let nearer = choice.best.as_ref().is_none_or(|(other, _)| other.kind == node.kind && off(node) < off(other));
-        if node.problem.is_none() && nearer {
-            choice.best = Some((node.clone(), named));
+        if !chosen.get(&file).is_some_and(|(_, best)| best.is_some()) {
+            let usable = members.into_iter().filter(|&k| unusable(&reports[k].1).is_none());
+            chosen.insert(file, (kind, nearest(reports, &usable.collect::<Vec<usize>>())));
         }
     }
     chosen
+}
+
+/// The one of some reports whose times are nearest to those of the others.
+fn nearest(reports: &[(String, Report)], members: &[usize]) -> Option<usize> {
+    let times: Vec<Times> = members.iter().map(|&k| Times::of(&reports[k].1)).collect();
+    let off = |own: usize| {
+        let others: Vec<&Times> = times.iter().enumerate().filter(|(k, _)| *k != own).map(|(_, t)| t).collect();
+        times[own].over(&others).map_or(0.0, |agreement| agreement.median.ln().abs())
+    };
+    let offs: Vec<f64> = (0..times.len()).map(off).collect();
+    (0..members.len()).min_by(|&a, &b| offs[a].total_cmp(&offs[b])).map(|k| members[k])
 }

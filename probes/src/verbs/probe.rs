@@ -15,7 +15,6 @@ use sapwise::{Hardware, measure, usable_cores};
 use sapwise_lab::data::read_report;
 use sapwise_lab::report;
 use sapwise_lab::report::{Report, Restriction};
-use sapwise_lab::steadiness::Steadiness;
 use sapwise_lab::sweep::Plan;
 use std::path::Path;
 use std::time::Instant;
@@ -143,14 +142,12 @@ fn assemble(
     found: Found,
     began: Instant,
 ) -> Report {
-    let mut report = Report {
+    Report {
         label: provenance::label(arguments, &found.points, hardware),
         provenance: provenance::provenance(arguments, restriction, hardware, began.elapsed()),
         hardware: hardware.clone(),
         algorithms: provenance::timed(&found.points, arguments.threads, hardware, algorithms),
         points: found.points,
         remarks: found.remarks,
-    };
-    report.remarks.extend(Steadiness::of(&report).and_then(Steadiness::remark));
-    report
+    }
 }

@@ -9,7 +9,7 @@ use serde::Serialize;
 /// The answer for machines.
 #[derive(Serialize)]
 struct Answer {
-    /// What was written.
+    /// The written files.
     files: Vec<String>,
 }
 

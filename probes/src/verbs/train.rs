@@ -3,16 +3,13 @@
 use crate::args::Train;
 use crate::check::doubts;
 use crate::exit::{Outcome, WrongUsage};
-use crate::outputs::picture_format;
 use crate::progress::Progress;
 use crate::terminal::Terminal;
 use crate::{interrupt, output, outputs, shell};
 use rayon::prelude::*;
 use sapwise::Model;
 use sapwise_lab::data::{Evidence, Selection, read_report, report_files};
-use sapwise_lab::evaluate::importance;
-use sapwise_lab::figures::{Figure, TrainingPicture};
-use sapwise_lab::write::{write_atomically, write_text};
+use sapwise_lab::write::write_text;
 use sapwise_lab::{Trained, Training, Validation, model_card, train, write_model};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -31,47 +28,25 @@ struct Answer<'a> {
 
 pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     let name = name(arguments)?;
-    let plot = arguments.plot.as_deref().map(|path| Ok::<_, WrongUsage>((path, picture_format(path)?))).transpose()?;
     let evidence = if arguments.simulated { Evidence::Simulated } else { Evidence::Real };
     let reports = report_files(&arguments.reports)?;
-    let outputs =
-        [Some(&arguments.out), arguments.card.as_ref(), arguments.plot.as_ref(), arguments.importance.as_ref()];
-    let outputs: Vec<_> = outputs.into_iter().flatten().collect();
+    let outputs: Vec<_> = [Some(&arguments.out), arguments.card.as_ref()].into_iter().flatten().collect();
     outputs::check(&reports, &outputs)?;
     interrupt::listen()?;
     let progress = Progress::new(reports.len() as u64);
     let (selection, doubtful) = select(&reports, evidence, &progress)?;
-    let importance =
-        arguments.importance.as_ref().map(|_| importance(&selection.clone().finish().0, &progress)).transpose()?;
-    let Trained { model, training, mut notes, held_out } = train(selection, &name, &progress)?;
+    let Trained { model, training, mut notes, .. } = train(selection, &name, &progress)?;
     drop(progress);
     notes.extend(doubtful.notes(&arguments.reports));
     write_text(&arguments.out, &write_model(&model, &training)?)?;
     if let Some(path) = &arguments.card {
-        let mut page = model_card::page(&model, &training, &notes);
-        if let Some(importance) = &importance {
-            page.push_str(&format!("\n## Importance\n\n{}", importance.page(model_card::markdown)));
-        }
-        write_text(path, &page)?;
-    }
-    if let Some((path, format)) = plot {
-        let caption = caption(&model, &training, &command(arguments, path));
-        let picture = TrainingPicture::new(&held_out).draw(format, &caption)?;
-        write_atomically(path, |out| Ok(out.write_all(&picture)?))?;
-    }
-    if let Some((path, importance)) = arguments.importance.as_ref().zip(importance.as_ref()) {
-        write_text(path, &sapwise::json::write(importance)?)?;
+        write_text(path, &model_card::page(&model, &training, &notes))?;
     }
     if arguments.json {
         output::print_json(&Answer { validation: &training.validation, model: &model.name, notes: &notes })?;
     } else {
         let terminal = Terminal::of_standard_output();
-        let importance = importance.map_or_else(String::new, |i| format!("{}\n", i.page(|rows| terminal.table(rows))));
-        let drawn = arguments.plot.as_ref().map_or(String::new(), |path| format!("\nDrawn in {}.", path.display()));
-        output::print(&format!(
-            "{importance}{}",
-            summary(&model, &training, &notes, &arguments.out, &drawn, terminal)
-        ))?;
+        output::print(&summary(&model, &training, &notes, &arguments.out, terminal))?;
     }
     Ok(Outcome::Done)
 }
@@ -130,25 +105,6 @@ fn name(arguments: &Train) -> anyhow::Result<String> {
     Ok(name)
 }
 
-/// What stands below the picture.
-fn caption(model: &Model, training: &Training, command: &str) -> Vec<String> {
-    let simulated = if model.simulated { "Simulated machines, no evidence of accuracy. " } else { "" };
-    let machines = training.validation.physical_machines;
-    let plural = if machines == 1 { "" } else { "s" };
-    vec![format!("{simulated}{machines} physical machine{plural}."), format!("Made by: {command}")]
-}
-
-/// The command that makes the picture again, without folders, which are of this machine alone.
-fn command(arguments: &Train, plot: &Path) -> String {
-    let name = |path: &Path| path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let reports = match &arguments.reports[..] {
-        [one] => name(one),
-        many => format!("({} reports or folders)", many.len()),
-    };
-    let simulated = if arguments.simulated { " --simulated" } else { "" };
-    format!("sapwise train{simulated} {reports} --out {} --plot {}", name(&arguments.out), name(plot))
-}
-
 /// What the columns in the summary mean, in few words.
 const COLUMNS: &str = "Regret is time over the best time, less one; in parentheses with the numbers of objects weighted as games are assumed to \
 have them (log-normal\naround 800). Crossovers off by: the median distance in octaves between measured and predicted crossovers. --card explains \
@@ -159,7 +115,6 @@ fn summary(
     training: &Training,
     notes: &[String],
     path: &Path,
-    drawn: &str,
     terminal: Terminal,
 ) -> String {
     let table = |rows: &[Vec<String>]| terminal.table(rows);
@@ -171,7 +126,7 @@ fn summary(
         text.push_str(&format!("{} {note}\n", terminal.warning("note:")));
     }
     text + &format!(
-        "\nThe model, named {:?}, is in {}.{drawn}\nNext: sapwise predict --model {}",
+        "\nThe model, named {:?}, is in {}.\nNext: sapwise predict --model {}",
         model.name,
         path.display(),
         shell::path(path)

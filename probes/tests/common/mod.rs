@@ -3,6 +3,7 @@
 #![allow(dead_code, reason = "each test program uses a part of this")]
 
 use assert_cmd::Command;
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// The command, with no SIMD level from the environment of the tests.
@@ -12,13 +13,36 @@ pub(crate) fn sapwise() -> Command {
     command
 }
 
+/// A sound and current report of this build, with twelve points. `machine` is a hex digit that tells machines apart.
+pub(crate) fn small_report(machine: &str) -> Value {
+    let text = include_str!("../../../crates/lab/tests/fixtures/report-2.json");
+    let mut report: Value = serde_json::from_str(text).unwrap();
+    report["label"] = "real_full".into();
+    report["hardware"]["machine"]["physical_id"] = machine.repeat(16).into();
+    let registry = sapwise::Registry::with_cores(2);
+    for algorithm in report["algorithms"].as_array_mut().unwrap() {
+        let own = registry.entries().iter().find(|e| algorithm["id"] == e.id.to_string().as_str()).unwrap();
+        algorithm["revision"] = own.revision.into();
+    }
+    let points = report["points"].as_array().unwrap().clone();
+    let scenarios = ["uniform", "slab", "mixed", "fast"].into_iter().flat_map(|scenario| {
+        points.iter().cloned().map(move |mut point| {
+            point["scenario"] = scenario.into();
+            point["foreign_load"] = 0.0.into();
+            point
+        })
+    });
+    report["points"] = scenarios.collect();
+    report
+}
+
 /// The command where no Vulkan driver is found. On other interfaces the adapters of the machine stay.
 pub(crate) fn without_adapters(command: &mut Command) -> &mut Command {
     command.env("VK_ICD_FILENAMES", "/nonexistent").env("VK_DRIVER_FILES", "/nonexistent")
 }
 
-/// The answer of `sapwise devices --json` on a machine with an adapter. `None`, with a line that says so, without any; a failure
-/// then where the environment says `SAPWISE_REQUIRE_GPU=1`.
+/// The answer of `sapwise devices --json` on a machine with an adapter. `None`, with a line that says so, without any;
+/// a failure then where the environment says `SAPWISE_REQUIRE_GPU=1`.
 pub(crate) fn devices_with_a_gpu(test: &str) -> Option<serde_json::Value> {
     let answer: serde_json::Value = serde_json::from_str(&success(sapwise().args(["devices", "--json"]))).unwrap();
     if answer["adapters"].as_array().unwrap().is_empty() {
@@ -30,12 +54,8 @@ pub(crate) fn devices_with_a_gpu(test: &str) -> Option<serde_json::Value> {
     Some(answer)
 }
 
-/// The remarks of a report but for the one that a host moved the cores of this machine meanwhile, which tests can't keep it from.
-pub(crate) fn remarks_but_of_moves(report: &sapwise_lab::report::Report) -> Vec<String> {
-    report.remarks.iter().filter(|r| !r.starts_with("the machine changed:")).cloned().collect()
-}
-
-/// Sends a signal to a running command. Not SIGINT, which shells let what runs in the background ignore, these tests among it.
+/// Sends a signal to a running command. Not SIGINT, which shells let what runs in the background ignore, these tests
+/// among it.
 #[cfg(unix)]
 pub(crate) fn send(signal: &str, to: &std::process::Child) {
     let sent = std::process::Command::new("kill").args([signal, &to.id().to_string()]).status().unwrap();

@@ -16,7 +16,7 @@ pub(crate) struct Deviations {
 
 impl Deviations {
     /// Of a prediction for this machine, about as on machines held out.
-    pub(super) const PREDICTED: Self = Self { cpu_ln: 0.3, gpu_ln: 0.3, kept_ln: 0.1, width_ln: 0.1, calls_ln: 0.3 };
+    pub(crate) const PREDICTED: Self = Self { cpu_ln: 0.3, gpu_ln: 0.3, kept_ln: 0.1, width_ln: 0.1, calls_ln: 0.3 };
     /// Of a machine unlike those of the training.
     pub(crate) const UNLIKE: Self = Self { cpu_ln: 0.8, gpu_ln: 0.8, kept_ln: 0.5, width_ln: 0.2, calls_ln: 0.7 };
     /// In line: tuning may be of another machine, and a core that is taken doubles the time of those that use it. What algorithms on the CPU have in common was

@@ -21,55 +21,82 @@ fn load(objects: u32) -> Load {
     Load::of_objects(objects).with_pairs(0.5 * n).with_candidates(n.powf(1.5), 4.0 * n)
 }
 
-/// By how much each cost is expected to differ from its prediction.
-fn deviations(observed: &Observed, load: &Load) -> Vec<f64> {
-    let of = |k: usize| observed.expected_ln(k, load).0 - observed.predicted()[k].curve.cost_ns(load).ln();
-    (0..observed.predicted().len()).map(of).collect()
+/// Predictions, and what is believed of them.
+struct Observed {
+    costs: Vec<AlgorithmCost>,
+    belief: Belief,
+}
+
+impl Observed {
+    fn within(deviations: Deviations) -> Self {
+        let costs = costs();
+        Self { belief: Belief::new(&costs, &[None; 5], deviations), costs }
+    }
+
+    /// A frame took `factor` times what was predicted.
+    fn observe(&mut self, algorithm: usize, load: &Load, factor: f64, noise_ln: f64) -> bool {
+        let (view, calls) = self.view(algorithm, load);
+        self.belief.observe(algorithm, &view, factor, calls, noise_ln)
+    }
+
+    fn view(&self, algorithm: usize, load: &Load) -> (View, f64) {
+        let frame = Frame::new(load);
+        let parts = self.costs[algorithm].curve.parts_of(&frame);
+        (self.belief.view(&frame), parts.calls_ns / parts.ns)
+    }
+
+    /// By how much each cost is expected to differ from its prediction.
+    fn deviations(&self, load: &Load) -> Vec<f64> {
+        let of = |k: usize| {
+            let (view, calls) = self.view(k, load);
+            self.belief.deviation_ln(k, &view, calls)
+        };
+        (0..self.costs.len()).map(of).collect()
+    }
 }
 
 #[test]
 fn an_observation_moves_relatives_the_more_the_nearer_they_are() {
-    let mut observed = Observed::new(costs());
+    let mut observed = Observed::within(Deviations::PREDICTED);
     let here = load(1000);
-    let ns = observed.predicted()[0].curve.cost_ns(&here);
-    assert!(observed.observe(0, &here, 1.5 * ns, 0.05));
-    let moved = deviations(&observed, &here);
+    assert!(observed.observe(0, &here, 1.5, 0.05));
+    let moved = observed.deviations(&here);
     // Itself, its method on two threads, another method, another processor.
     assert!(moved[0] > moved[1] && moved[1] > moved[2] && moved[2] > 0.05 && moved[4] == 0.0, "{moved:?}");
     assert!((0.3..0.42).contains(&moved[0]), "{moved:?}");
     // Far away on its own part only the constants are left.
-    let far = deviations(&observed, &load(1_000_000));
+    let far = observed.deviations(&load(1_000_000));
     assert!(far[0] < 0.9 * moved[0] && far[0] > 0.2, "{far:?} {moved:?}");
 }
 
 #[test]
 fn many_observations_are_believed_and_doubt_falls() {
-    let mut observed = Observed::new(costs());
+    let mut observed = Observed::within(Deviations::PREDICTED);
     let here = load(5000);
-    let ns = observed.predicted()[1].curve.cost_ns(&here);
     let doubt = |observed: &mut Observed| {
-        let (_, slope) = observed.expected_ln(1, &here);
-        observed.prepare(&slope)
+        let (view, calls) = observed.view(1, &here);
+        let expected = observed.belief.expect(1, &view, calls);
+        expected.shared + expected.own
     };
     let before = doubt(&mut observed);
     for _ in 0..40 {
-        assert!(observed.observe(1, &here, 0.7 * ns, 0.1));
+        assert!(observed.observe(1, &here, 0.7, 0.1));
     }
-    assert!((deviations(&observed, &here)[1] - 0.7_f64.ln()).abs() < 0.03);
+    assert!((observed.deviations(&here)[1] - 0.7_f64.ln()).abs() < 0.03);
     assert!(doubt(&mut observed) < 0.1 * before && doubt(&mut observed) >= 0.0);
 }
 
 #[test]
 fn the_costs_are_those_that_are_expected() {
-    let mut observed = Observed::of_unlike_machine(costs());
+    let mut observed = Observed::within(Deviations::UNLIKE);
     for (k, objects, factor) in [(0, 300, 1.2), (1, 40_000, 2.0), (3, 2000, 0.6), (4, 100_000, 3.0), (2, 50, 0.9)] {
-        let ns = observed.predicted()[k].curve.cost_ns(&load(objects));
-        assert!(observed.observe(k, &load(objects), factor * ns, 0.05));
+        assert!(observed.observe(k, &load(objects), factor, 0.05));
     }
-    let after = observed.costs();
+    let after = observed.belief.costs(&observed.costs, false, 0.0);
     for objects in [20, 900, 30_000, 700_000] {
-        for (k, cost) in after.iter().enumerate() {
-            let ratio = cost.curve.cost_ns(&load(objects)).ln() - observed.expected_ln(k, &load(objects)).0;
+        let here = load(objects);
+        for ((cost, before), deviation) in after.iter().zip(&observed.costs).zip(observed.deviations(&here)) {
+            let ratio = (cost.curve.cost_ns(&here) / before.curve.cost_ns(&here)).ln() - deviation;
             assert!(ratio.abs() < 1e-9, "{} at {objects}: {ratio}", cost.algorithm);
             assert_eq!(cost.curve.defect(), None);
         }
@@ -78,23 +105,30 @@ fn the_costs_are_those_that_are_expected() {
 
 #[test]
 fn a_time_that_waited_for_a_core_is_not_believed_as_it_stands() {
-    let mut observed = Observed::new(costs());
+    let mut observed = Observed::within(Deviations::PREDICTED);
     let here = load(1000);
-    let ns = observed.predicted()[0].curve.cost_ns(&here);
-    assert!(observed.observe(0, &here, 1000.0 * ns, 0.1));
-    assert!(deviations(&observed, &here)[0] < 1.3);
+    assert!(observed.observe(0, &here, 1000.0, 0.1));
+    assert!(observed.deviations(&here)[0] < 1.3);
 }
 
 #[test]
 fn what_is_no_time_tells_nothing() {
-    let mut observed = Observed::new(costs());
-    let before = deviations(&observed, &load(1000));
-    for (k, ns, noise) in
-        [(0, f64::NAN, 0.1), (0, 0.0, 0.1), (0, -1.0, 0.1), (0, f64::INFINITY, 0.1), (9, 1.0, 0.1), (0, 1.0, f64::NAN)]
-    {
-        assert!(!observed.observe(k, &load(1000), ns, noise), "{k} {ns} {noise}");
+    let here = load(1000);
+    let ns = costs()[0].curve.cost_ns(&here);
+    let none = [
+        (0, here, f64::NAN, 0.1),
+        (0, here, 0.0, 0.1),
+        (0, here, -1.0, 0.1),
+        (0, here, f64::INFINITY, 0.1),
+        (9, here, ns, 0.1),
+        (0, here, ns, f64::NAN),
+    ];
+    let after = crate::tuning::corrected(&costs(), none);
+    for (after, before) in after.iter().zip(costs()) {
+        assert_eq!(after.curve.cost_ns(&here), before.curve.cost_ns(&here));
     }
-    assert_eq!(deviations(&observed, &load(1000)), before);
+    let after = crate::tuning::corrected(&costs(), [(0, here, 1.5 * ns, 0.05)]);
+    assert!(after[0].curve.cost_ns(&here) > 1.3 * ns);
 }
 
 #[test]

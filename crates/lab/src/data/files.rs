@@ -43,7 +43,7 @@ pub fn read_document(path: &Path, warn: &dyn Fn(&str)) -> anyhow::Result<Documen
             let (model, skipped) = read_model_and_skipped(&text).with_context(unsound)?;
             (Document::Model(Box::new(model)), skipped)
         }
-        // Under the older name the error tells how to convert it.
+        // Under the older name the error says how to make it again.
         "tuning" | "fields" => {
             let read = Format::TUNING.read(&text).with_context(unsound)?;
             (Document::Tuning(Box::new(read.value)), read.skipped)

@@ -6,7 +6,7 @@ mod profile;
 mod selection;
 
 pub use compared::{COMPARED, COMPARED_OF_GPUS, figure};
-pub(crate) use compared::{first_real_gpu, is_real};
+pub(crate) use compared::is_real;
 pub use files::{
     Document, json_files, read_document, read_report, read_reports, read_text, refuse_twice, report_files,
 };

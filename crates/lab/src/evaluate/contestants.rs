@@ -14,8 +14,6 @@ use sapwise::{AlgorithmCost, AlgorithmId, Model};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-/// Ours, corrected by [`SAMPLES`](super::sampled::SAMPLES) samples on the machine itself.
-pub(super) const SAMPLED: &str = "ours + 8 samples";
 const PHYSICS: &str = "physics";
 const FOREST: &str = "random forest";
 const NEAREST: &str = "nearest machine";
@@ -245,11 +243,7 @@ impl Fitted<'_> {
 }
 
 /// Chooses the cheapest by costs; nothing, which counts as the worst, where there are none.
-pub(super) fn by<'a>(
-    name: &'static str,
-    costs: Option<&'a [AlgorithmCost]>,
-    available: &'a [AlgorithmId],
-) -> Contestant<'a> {
+fn by<'a>(name: &'static str, costs: Option<&'a [AlgorithmCost]>, available: &'a [AlgorithmId]) -> Contestant<'a> {
     let costs = costs.unwrap_or_default();
     let choose = if costs.is_empty() { nothing() } else { by_costs(costs.to_vec(), available) };
     Contestant { name, choose, costs: Some(costs) }

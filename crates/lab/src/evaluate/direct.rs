@@ -4,7 +4,7 @@
 use super::regret_table::Strategy;
 use crate::data::{Profile, figure};
 use crate::fit::columns::Columns;
-use crate::paired::{PairedOutcome, PairedSamples, compare};
+use crate::paired::{Crossing, PairedRatio, PairedSamples};
 use anyhow::{Context, Result};
 use linfa::DatasetBase;
 use linfa::traits::Fit;
@@ -32,19 +32,49 @@ const GPU_PARAMETERS: [&str; 4] = [
 
 /// A method on one thread or on all threads of its machine, on one GPU or on all: counts differ between machines, these do not.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-struct Role {
+pub(super) struct Role {
     class: BackendClass,
     method: String,
     /// All threads, or all GPUs; `false` where there is only one.
     all: bool,
 }
 
+impl std::fmt::Display for Role {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let units = match (self.class, self.all) {
+            (BackendClass::Cpu, false) => "one thread",
+            (BackendClass::Cpu, true) => "all threads",
+            (BackendClass::Gpu, false) => "one GPU",
+            (BackendClass::Gpu, true) => "all GPUs",
+        };
+        write!(f, "{} on {units}", self.method)
+    }
+}
+
 /// Which of two roles is cheaper at which sizes on one machine.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct RoleOutcome {
-    first: Role,
-    second: Role,
-    found: PairedOutcome,
+    pub(super) first: Role,
+    pub(super) second: Role,
+    /// Ascending; none where one of the two is always cheaper.
+    crossings: Vec<Crossing>,
+    first_is_cheaper: bool,
+}
+
+impl RoleOutcome {
+    /// Natural logarithm of the objects at the last crossover, and whether the first is the cheaper one below it.
+    pub(super) fn last_crossover(&self) -> Option<(f64, bool)> {
+        self.crossings.last().map(|c| (c.objects.ln(), c.first_below))
+    }
+
+    /// The parameters that its crossover is regressed on.
+    pub(super) fn parameters(&self) -> [&'static str; 4] {
+        parameters(&self.first, &self.second)
+    }
+}
+
+fn parameters(a: &Role, b: &Role) -> [&'static str; 4] {
+    if [a, b].iter().any(|role| role.class == BackendClass::Gpu) { GPU_PARAMETERS } else { PARAMETERS }
 }
 
 /// What is found for each two roles of a profile in its scenario `uniform`, or its first one.
@@ -69,8 +99,13 @@ pub(super) fn role_outcomes(profile: &Profile) -> Vec<RoleOutcome> {
                     Some(PairedSamples { objects, first_ns: first.as_ref()?, second_ns: second.as_ref()? })
                 })
                 .collect();
-            if let Some(found) = compare(&points) {
-                outcomes.push(RoleOutcome { first: roles[a].0.clone(), second: roles[b].0.clone(), found });
+            if let Some(ratio) = PairedRatio::new(&points) {
+                outcomes.push(RoleOutcome {
+                    first: roles[a].0.clone(),
+                    second: roles[b].0.clone(),
+                    crossings: ratio.crossings(),
+                    first_is_cheaper: ratio.first_is_cheaper(),
+                });
             }
         }
     }
@@ -166,26 +201,24 @@ fn predict(
     b: &Role,
 ) -> Result<Option<(Prediction, Option<Estimate>)>> {
     let of_pair = |outcomes: &'_ [RoleOutcome]| outcomes.iter().position(|c| c.first == *a && c.second == *b);
-    let found: Vec<(&Hardware, &PairedOutcome)> = training
+    let found: Vec<(&Hardware, &RoleOutcome)> = training
         .iter()
-        .filter_map(|(profile, outcomes)| Some((&profile.hardware, &outcomes[of_pair(outcomes)?].found)))
+        .filter_map(|(profile, outcomes)| Some((&profile.hardware, &outcomes[of_pair(outcomes)?])))
         .collect();
-    let crossed: Vec<_> = found.iter().filter_map(|(h, c)| c.positions().last().map(|p| (*h, p))).collect();
+    let crossed: Vec<_> = found.iter().filter_map(|(h, c)| c.crossings.last().map(|p| (*h, p))).collect();
     if found.is_empty() {
         return Ok(None);
     }
     if 2 * crossed.len() <= found.len() {
-        let firsts = found.iter().filter(|(_, c)| **c == PairedOutcome::AlwaysFirst).count();
-        let seconds = found.iter().filter(|(_, c)| **c == PairedOutcome::AlwaysSecond).count();
+        let always = |c: &RoleOutcome, first: bool| c.crossings.is_empty() && c.first_is_cheaper == first;
+        let [firsts, seconds] = [true, false].map(|first| found.iter().filter(|(_, c)| always(c, first)).count());
         return Ok(Some((Prediction::Always { first: firsts >= seconds }, None)));
     }
     let first_below = 2 * crossed.iter().filter(|(_, p)| p.first_below).count() >= crossed.len();
     let rows: Vec<_> = crossed.into_iter().filter(|(_, p)| p.first_below == first_below).collect();
     let machines: Vec<&Hardware> = rows.iter().map(|r| r.0).collect();
     let ln_objects: Vec<f64> = rows.iter().map(|r| r.1.objects.ln()).collect();
-    let on_gpu = [a, b].iter().any(|role| role.class == BackendClass::Gpu);
-    let names = if on_gpu { GPU_PARAMETERS } else { PARAMETERS };
-    let estimate = estimate(&names, &machines, &ln_objects, hardware)?;
+    let estimate = estimate(&parameters(a, b), &machines, &ln_objects, hardware)?;
     Ok(Some((Prediction::At { ln_objects: estimate.value, first_below }, Some(estimate))))
 }
 

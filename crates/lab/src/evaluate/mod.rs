@@ -11,21 +11,18 @@ mod floor;
 mod forest;
 mod held_out;
 mod importance;
-#[cfg(test)]
-mod misspecified;
 mod notes;
 mod partition;
 #[cfg(test)]
 mod reference;
 mod regret_table;
-mod sampled;
 mod scores;
 mod validate;
 
 pub use baselines::by_costs;
 pub use crossovers::ComparedCrossover;
 pub use held_out::{HeldOut, HeldOutCrossover, Time};
-pub use importance::{Effect, Importance, Interval, OfParameter, Verdict, importance};
+pub use importance::{Influence, influences};
 pub use notes::folded;
 pub use partition::Partition;
 pub use regret_table::{NOT_TIMED, Regret, RegretTable, Strategy};

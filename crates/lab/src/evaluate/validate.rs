@@ -1,29 +1,23 @@
 //! How well each strategy does on machines that it was not trained on, in scenarios that it has seen and that it has not.
 
-use super::contestants::{Contestant, Fitted, Material, SAMPLED, by};
+use super::contestants::{Contestant, Fitted, Material};
 use super::coverage::{Errors, coverage};
 use super::crossovers::MeasuredCrossovers;
 use super::floor::floor;
 use super::held_out::{HeldOut, HeldOutCrossover, Time};
 use super::partition::Partition;
 use super::regret_table::{Regret, RegretTable};
-use super::sampled::{self, Predicted};
 use super::scores::{self, Judged};
 use crate::data::{Profile, machines};
 use crate::fit::Designs;
 use crate::progress::Progress;
-use crate::spread::{percent, range};
 use crate::training::Validation;
 use anyhow::Result;
 use rayon::prelude::*;
-use sapwise::Observed;
-use sapwise::stats::mean;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Profiles that are judged, of all folds together, about: scores of a hundred machines change little with thousands more.
 const MOST_JUDGED: usize = 120;
-/// Held-out profiles on which samples are taken, at most.
-const MOST_SAMPLED: usize = 64;
 /// Fits without a fold and without a scenario, at most: of many machines each is held out in some scenarios.
 const MOST_UNSEEN: usize = 80;
 /// And of so many profiles fewer, since each fit takes longer.
@@ -84,25 +78,18 @@ pub fn validate(
             progress.advance(1);
             Ok(found)
         };
-        let mut predicted = Vec::new();
         let mut errors = Vec::new();
         for found in partition.folds.par_iter().map(fold).collect::<Result<Vec<Found>>>()? {
             all.extend(found.judged);
             times.extend(found.times);
             crossovers.extend(found.crossovers);
             notes.extend(found.notes);
-            for p in found.predicted {
-                errors.push(Errors::of(&profiles[p.held], &p.costs));
-                predicted.push(p);
-            }
+            errors.extend(found.errors);
         }
         let unseen = unseen(&data, partition, &judged, progress)?;
         for judged in &mut all {
             judged.unseen = unseen.get(&(judged.file.clone(), judged.name)).cloned();
         }
-        let sampled = sampled(&data, predicted)?;
-        all.extend(sampled.judged);
-        notes.extend(sampled.told);
         chance = floor(profiles, |k| data.regret_table(k), |k| data.costs(k));
         covered = coverage(&errors).filter(|_| partition.by_machine);
     }
@@ -131,16 +118,10 @@ pub fn validate(
 #[derive(Default)]
 struct Found {
     judged: Vec<Judged>,
-    predicted: Vec<Predicted>,
+    errors: Vec<Errors>,
     times: Vec<Time>,
     crossovers: Vec<HeldOutCrossover>,
     notes: Vec<String>,
-}
-
-/// What is found by samples on what was held out.
-struct OfSamples {
-    judged: Vec<Judged>,
-    told: Option<String>,
 }
 
 /// The regrets of every strategy on some of the profiles of a fold, by what was fitted without it.
@@ -169,7 +150,7 @@ fn held_out(data: &Material<'_>, fitted: &Fitted<'_>, judged: &[usize]) -> Resul
             Judged { by_means, ..Judged::new(contestant.name, profile, regret, crossings) }
         };
         found.judged.extend(contestants.into_iter().map(regret));
-        found.predicted.push(Predicted { held, costs: costs.unwrap_or_default().to_vec() });
+        found.errors.push(Errors::of(profile, costs.unwrap_or_default()));
     }
     Ok(found)
 }
@@ -218,41 +199,6 @@ fn unseen(
         all.insert(key, before.and(regret));
     }
     Ok(all)
-}
-
-/// What samples add to predictions.
-fn sampled(data: &Material<'_>, predicted: Vec<Predicted>) -> Result<OfSamples> {
-    // Of many machines some: more don't tell a mean regret better.
-    let step = predicted.len().div_ceil(MOST_SAMPLED).max(1);
-    let predicted: Vec<Predicted> = predicted.into_iter().step_by(step).collect();
-    let judge = |k: usize| {
-        let held = predicted[k].held;
-        let profile = &data.profiles[held];
-        let corrected = sampled::corrected(profile, Observed::new(predicted[k].costs.clone()))?;
-        let available = profile.available();
-        // Where no sample can be taken the prediction stays.
-        let costs = corrected.as_deref().unwrap_or(&predicted[k].costs);
-        let [with, without] = [costs, &predicted[k].costs].map(|costs| by(SAMPLED, Some(costs), &available));
-        let regret = |c: &Contestant<'_>| data.regret_table(held).regret(profile, &c.choose);
-        let crossings = MeasuredCrossovers::new(profile, data.costs(held)).errors(costs);
-        let (without, with) = (regret(&without).mean, regret(&with));
-        Ok((without, with.mean, Judged::new(SAMPLED, profile, with, Some(crossings))))
-    };
-    let found = (0..predicted.len()).into_par_iter().map(judge).collect::<Result<Vec<(f64, f64, Judged)>>>()?;
-    let (without, with): (Vec<f64>, Vec<f64>) = found.iter().map(|f| (f.0, f.1)).unzip();
-    let told = (!found.is_empty()).then(|| {
-        let told = |regrets: &[f64]| percent(mean(regrets), range(regrets), 1);
-        format!(
-            "{} samples replayed from the timings that judge them, on {} held-out reports: the mean regret goes from {} to {}, 95th percentile \
-             {:.1} %",
-            sampled::SAMPLES,
-            found.len(),
-            told(&without),
-            told(&with),
-            100.0 * scores::percentile_95(with.iter().map(|r| (*r, 1.0)).collect())
-        )
-    });
-    Ok(OfSamples { judged: found.into_iter().map(|f| f.2).collect(), told })
 }
 
 #[cfg(test)]

@@ -1,156 +1,60 @@
-//! Which hardware parameters are linked to which algorithms and crossovers.
+//! What each hardware parameter is worth to each crossover, as a table of shaded numbers.
 
-use super::canvas::Area;
-use super::chart::{Frame, Stroke, missing, path, words};
-use super::legend::{Legend, Sign};
-use super::style::{self, GAP, GRID, INK, LABEL, SMALL, WIDTH, line_height};
-use super::{Figure, font, verdict};
-use crate::evaluate::Verdict;
-use plotters::element::Text;
-use plotters::style::FontTransform;
-use plotters_backend::text_anchor::{HPos, VPos};
+use super::{HPos, LINE, Result, colour, svg, text};
+use plotters::prelude::*;
 
-/// A matrix of verdicts: a row for each parameter, a column for each algorithm or crossover.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Influence {
+/// Pixels of the names of rows, and of a cell.
+const ROW_NAMES: i32 = 430;
+const CELL: (i32, i32) = (130, 26);
+
+/// A number for each row and column, where it is known.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Matrix {
     pub(crate) title: String,
     pub(crate) columns: Vec<String>,
-    pub(crate) rows: Vec<String>,
-    /// For each row one cell for each column; one that is missing has no verdict.
-    pub(crate) cells: Vec<Vec<InfluenceCell>>,
+    pub(crate) rows: Vec<(String, Vec<Option<f64>>)>,
 }
 
-/// One parameter and one algorithm or crossover.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct InfluenceCell {
-    /// `None` of too few values.
-    pub(crate) verdict: Option<Verdict>,
-    /// What stands in the cell, as the rank correlation.
-    pub(crate) text: String,
-}
-
-/// The longest name of a row and of a column is cut to these widths.
-const ROW_NAME: i32 = 300;
-const COLUMN_NAME: i32 = 240;
-/// Width of a cell: no narrower, where needed the whole picture is wider; no wider.
-const NARROW: i32 = 46;
-const WIDE: i32 = 150;
-/// Height of a cell.
-const CELL: i32 = 40;
-/// Lines of a name above a column that is not turned.
-const NAME_LINES: usize = 3;
-
-/// Where the cells are, and how the names of the columns stand.
-struct Plan {
-    left: i32,
-    top: i32,
-    cell: i32,
-    /// Lines of each name; `None` where they are turned.
-    upright: Option<Vec<Vec<String>>>,
-}
-
-impl Influence {
-    fn plan(&self) -> Plan {
-        let names = self.rows.iter().map(|name| font::width(name, LABEL)).max().unwrap_or(0).min(ROW_NAME);
-        let left = GAP + names + 10;
-        let columns = self.columns.len().max(1) as i32;
-        let cell = ((WIDTH as i32 - GAP - left) / columns).clamp(NARROW, WIDE);
-        let lines: Vec<Vec<String>> =
-            self.columns.iter().map(|name| font::wrapped(name, SMALL, cell - 6, usize::MAX)).collect();
-        // A word that was cut to fit is not to be read.
-        let whole = |(name, lines): (&String, &Vec<String>)| lines.join(" ") == *name && lines.len() <= NAME_LINES;
-        let upright = self.columns.iter().zip(&lines).all(whole);
-        let top = if upright {
-            lines.iter().map(Vec::len).max().unwrap_or(0) as i32 * line_height(SMALL)
-        } else {
-            self.columns.iter().map(|name| font::width(name, SMALL)).max().unwrap_or(0).min(COLUMN_NAME)
-        };
-        Plan { left, top: top + GAP, cell, upright: upright.then_some(lines) }
-    }
-
-    fn legend(&self) -> Legend {
-        let entries = verdict::ALL.map(|verdict| {
-            let name = verdict.map_or_else(|| "absent: too few values".to_owned(), |verdict| verdict.to_string());
-            (Sign::Verdict(verdict), name)
-        });
-        Legend::new(entries.to_vec(), WIDTH as i32 - 2 * GAP)
-    }
-
-    fn is_empty(&self) -> bool {
-        self.rows.is_empty() || self.columns.is_empty()
-    }
-
-    fn heads(&self, area: &Area<'_>, plan: &Plan) -> anyhow::Result<()> {
-        let bottom = plan.top - 6;
-        for (k, name) in self.columns.iter().enumerate() {
-            let x = plan.left + k as i32 * plan.cell + plan.cell / 2;
-            if let Some(lines) = plan.upright.as_ref().map(|all| &all[k]) {
-                for (up, line) in lines.iter().rev().enumerate() {
-                    let place = (x, bottom - 8 - up as i32 * line_height(SMALL));
-                    words(area, line, place, SMALL, INK, HPos::Center, VPos::Center)?;
+impl Matrix {
+    /// Draws the rows from the first at the top; the largest number is the darkest.
+    ///
+    /// # Errors
+    /// When plotters fails.
+    pub(crate) fn svg(&self) -> Result<String> {
+        let top = 2 * LINE as i32 + 8;
+        let width = ROW_NAMES + CELL.0 * self.columns.len() as i32 + 12;
+        let height = top + CELL.1 * self.rows.len() as i32 + 12;
+        let most = self.rows.iter().flat_map(|r| &r.1).flatten().fold(0.0_f64, |most, v| most.max(*v));
+        svg((width as u32, height as u32), &self.title, &[], |area| {
+            let left = |column: usize| ROW_NAMES + CELL.0 * column as i32;
+            for (column, name) in self.columns.iter().enumerate() {
+                for (line, part) in halves(name).iter().enumerate() {
+                    let at = (left(column) + CELL.0 / 2, LINE as i32 * line as i32 + LINE as i32 / 2);
+                    text(area, part, at, HPos::Center)?;
                 }
-            } else {
-                let name = font::wrapped(name, SMALL, COLUMN_NAME, 1).concat();
-                let turned = style::text(SMALL, INK, HPos::Left, VPos::Center).transform(FontTransform::Rotate270);
-                area.draw(&Text::new(name, (x, bottom), turned))?;
             }
-        }
-        Ok(())
+            for (row, (name, values)) in self.rows.iter().enumerate() {
+                let (y, middle) = (top + CELL.1 * row as i32, top + CELL.1 * row as i32 + CELL.1 / 2);
+                text(area, name, (ROW_NAMES - 8, middle), HPos::Right)?;
+                for (column, value) in values.iter().enumerate() {
+                    let Some(value) = value else { continue };
+                    let (x, shade) = (left(column), (value / most.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0));
+                    let corners = [(x + 1, y + 1), (x + CELL.0 - 1, y + CELL.1 - 1)];
+                    area.draw(&Rectangle::new(corners, colour(1).mix(0.05 + 0.9 * shade).filled()))?;
+                    text(area, &format!("{value:.2}"), (x + CELL.0 / 2, middle), HPos::Center)?;
+                }
+            }
+            Ok(())
+        })
     }
 }
 
-const NOTHING: &str = "there are too few machines to tell what is linked";
-
-impl Figure for Influence {
-    fn title(&self) -> &str {
-        &self.title
-    }
-
-    fn size(&self) -> (u32, u32) {
-        let legend = self.legend().height() + GAP;
-        if self.is_empty() {
-            return (WIDTH, (160 + legend) as u32);
-        }
-        let plan = self.plan();
-        let width = plan.left + self.columns.len() as i32 * plan.cell + GAP;
-        (WIDTH.max(width as u32), (plan.top + self.rows.len() as i32 * CELL + GAP + legend) as u32)
-    }
-
-    fn draw_on(&self, area: &Area<'_>) -> anyhow::Result<()> {
-        let legend = self.legend();
-        let bottom = self.size().1 as i32 - legend.height();
-        legend.draw(area, (GAP, bottom))?;
-        if self.is_empty() {
-            let frame = Frame { left: GAP, top: GAP, right: WIDTH as i32 - GAP, bottom: bottom - GAP };
-            return missing(area, frame, NOTHING);
-        }
-        let plan = self.plan();
-        self.heads(area, &plan)?;
-        for (row, name) in self.rows.iter().enumerate() {
-            let top = plan.top + row as i32 * CELL;
-            let name = font::wrapped(name, LABEL, ROW_NAME, 1).concat();
-            words(area, &name, (plan.left - 8, top + CELL / 2), LABEL, INK, HPos::Right, VPos::Center)?;
-            for column in 0..self.columns.len() {
-                let left = plan.left + column as i32 * plan.cell;
-                let frame = Frame { left, top, right: left + plan.cell, bottom: top + CELL };
-                let absent = InfluenceCell::default();
-                let cell = self.cells.get(row).and_then(|cells| cells.get(column)).unwrap_or(&absent);
-                cell.draw(area, frame)?;
-            }
-        }
-        Ok(())
-    }
-}
-
-impl InfluenceCell {
-    fn draw(&self, area: &Area<'_>, frame: Frame) -> anyhow::Result<()> {
-        let Frame { left, top, right, bottom } = frame;
-        let middle = (left + right) / 2;
-        let text = font::wrapped(&self.text, SMALL, frame.width() - 4, 1).concat();
-        let symbol = if text.is_empty() { (top + bottom) / 2 } else { top + 12 };
-        verdict::draw(self.verdict, area, frame, (middle, symbol))?;
-        words(area, &text, (middle, bottom - 11), SMALL, INK, HPos::Center, VPos::Center)?;
-        let corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)];
-        path(area, &corners, Stroke::solid(GRID, 1))
+/// A name with blanks for underscores, on two lines.
+fn halves(name: &str) -> [String; 2] {
+    let words = name.replace('_', " ");
+    let at = words.match_indices(' ').map(|(at, _)| at).min_by_key(|at| at.abs_diff(words.len() / 2));
+    match at {
+        Some(at) => [words[..at].to_owned(), words[at + 1..].to_owned()],
+        None => [words, String::new()],
     }
 }

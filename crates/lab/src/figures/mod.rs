@@ -1,37 +1,130 @@
-//! Pictures of plain data, as SVG and as PNG.
+//! Figures as SVG, drawn by plotters from plain data.
 
-mod agreement;
-mod axis;
-mod canvas;
-mod chart;
 mod curves;
-mod figure;
-mod font;
 mod influence;
-mod legend;
-mod legended;
 mod map;
-mod mark;
-mod picture;
-mod ranks;
 mod ratios;
-mod regrets;
 mod replay;
-mod style;
-mod training;
-mod verdict;
 
-pub(crate) use agreement::{Agreement, AgreementGroup, AgreementPoint, Values};
-pub(crate) use curves::{Band, CrossoverLine, Curve, CurvePanel, CurvePoint, Curves};
-pub use figure::Figure;
-pub(crate) use influence::{Influence, InfluenceCell};
-pub(crate) use map::{FieldMap, MapCell, MapPanel, MapPoint};
-pub use picture::{Picture, UnknownPicture};
-pub use ranks::RanksPicture;
-pub(crate) use ratios::{RatioGroup, RatioKind, RatioValue, Ratios};
-pub(crate) use regrets::{Regrets, StrategyRegrets};
-pub use replay::ReplayPicture;
-pub use training::TrainingPicture;
+use anyhow::Result;
+use plotters::coord::Shift;
+use plotters::coord::ranged1d::{Ranged, ValueFormatter};
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+pub(crate) use curves::{Curve, CurvePanel, Curves, Field};
+pub(crate) use influence::Matrix;
+pub(crate) use map::{Cell, FieldMap, MapPanel};
+pub(crate) use ratios::Ratios;
+pub use replay::Replay;
+
+type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+/// Pixels of the title, of a line of text, and of the names at the right.
+const HEAD: u32 = 40;
+const LINE: u32 = 20;
+const NAMES: u32 = 230;
+/// Size of letters, as plotters counts it: 1.24 em.
+const LETTERS: u32 = 15;
+
+/// Okabe and Ito's colours, which colour-blind readers tell apart, then four more; black is for what was chosen.
+const COLOURS: [RGBColor; 11] = [
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(220, 205, 50),
+    RGBColor(120, 94, 240),
+    RGBColor(140, 90, 40),
+    RGBColor(160, 40, 90),
+    RGBColor(150, 150, 150),
+];
+
+/// The colour of the series at a position.
+fn colour(k: usize) -> RGBColor {
+    COLOURS[k % COLOURS.len()]
+}
+
+/// Text without characters that an SVG can't hold or that turn the direction of what follows.
+pub(crate) fn plain(text: &str) -> String {
+    let turns = |c: char| matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    text.chars().map(|c| if c.is_control() || turns(c) { char::REPLACEMENT_CHARACTER } else { c }).collect()
+}
+
+fn style(h: HPos, v: VPos) -> TextStyle<'static> {
+    ("sans-serif", LETTERS).into_font().color(&BLACK).pos(Pos::new(h, v))
+}
+
+/// Draws a text at a place in pixels.
+fn text(area: &Area<'_>, text: &str, at: (i32, i32), h: HPos) -> Result<()> {
+    Ok(area.draw(&Text::new(plain(text), at, style(h, VPos::Center)))?)
+}
+
+/// An SVG of this width and height, with a title above and the names of the colours at the right.
+///
+/// # Errors
+/// When `content` fails or plotters does.
+fn svg(
+    (width, height): (u32, u32),
+    title: &str,
+    names: &[String],
+    content: impl FnOnce(&Area<'_>) -> Result<()>,
+) -> Result<String> {
+    let mut file = String::new();
+    let height = (height + HEAD).max(HEAD + LINE * (names.len() as u32 + 1));
+    let root = SVGBackend::with_string(&mut file, (width, height)).into_drawing_area();
+    root.fill(&WHITE)?;
+    let (head, rest) = root.split_vertically(HEAD);
+    let large = ("sans-serif", LETTERS + 5).into_font().color(&BLACK).pos(Pos::new(HPos::Left, VPos::Center));
+    head.draw(&Text::new(plain(title), (12, HEAD as i32 / 2), large))?;
+    let (body, legend) = rest.split_horizontally(if names.is_empty() { width } else { width - NAMES });
+    content(&body)?;
+    for (k, name) in names.iter().enumerate() {
+        let y = (LINE * (k as u32 + 1)) as i32;
+        legend.draw(&Rectangle::new([(8, y - 6), (26, y + 6)], colour(k).filled()))?;
+        text(&legend, name, (34, y), HPos::Left)?;
+    }
+    root.present()?;
+    drop((root, head, rest, body, legend));
+    Ok(file)
+}
+
+/// Draws the grid with its numbers and the names of both axes.
+fn mesh<'a, X, Y>(chart: &mut ChartContext<'a, SVGBackend<'a>, Cartesian2d<X, Y>>, x: &str, y: &str) -> Result<()>
+where
+    X: Ranged<ValueType = f64> + ValueFormatter<f64>,
+    Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
+{
+    let mut mesh = chart.configure_mesh();
+    mesh.light_line_style(TRANSPARENT).bold_line_style(BLACK.mix(0.15)).x_desc(x).y_desc(y);
+    mesh.label_style(style(HPos::Left, VPos::Top)).axis_desc_style(style(HPos::Left, VPos::Top));
+    Ok(mesh.x_labels(7).y_labels(8).x_label_formatter(&tick).y_label_formatter(&tick).draw()?)
+}
+
+/// The smallest range that holds all values above zero, wider by a factor at both ends.
+fn range(values: impl Iterator<Item = f64>, wider: f64) -> std::ops::Range<f64> {
+    let known = values.filter(|v| v.is_finite() && *v > 0.0);
+    let (low, high) = known.fold((f64::INFINITY, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)));
+    if low <= high { low / wider..high * wider } else { 0.1..10.0 }
+}
+
+/// A number on an axis: `100 000`, `0.01`.
+fn tick(value: &f64) -> String {
+    if *value >= 1000.0 { crate::text::grouped(*value as u64) } else { format!("{}", (value * 1e6).round() / 1e6) }
+}
+
+/// Areas for so many panels, in rows of up to three.
+fn panels<'a>(area: &Area<'a>, count: usize) -> Vec<Area<'a>> {
+    area.split_evenly(grid(count))
+}
+
+/// Rows and columns of so many panels.
+fn grid(count: usize) -> (usize, usize) {
+    let columns = if count == 4 { 2 } else { count.clamp(1, 3) };
+    (count.div_ceil(columns).max(1), columns)
+}
 
 #[cfg(test)]
 mod tests;

@@ -5,14 +5,12 @@ use crate::fit::designs::{Designs, TrainingSet};
 use crate::fit::load_residual::noise_ln;
 use crate::fit::model::model;
 use crate::fit::rows::{Row, rows};
-use crate::paired::{PairedComparison, PairedSamples};
+use crate::paired::{PairedRatio, PairedSamples};
 use crate::report::{Label, Point, Report};
 use crate::text::count;
 use anyhow::{Result, bail};
 use sapwise::hardware::{GpuParameterId, ParameterId, Quantity};
-use sapwise::{
-    AlgorithmCost, AlgorithmId, Crossover, Entry, Hardware, Load, Model, Observed, Parameter, Source, Tuning,
-};
+use sapwise::{AlgorithmCost, AlgorithmId, Crossover, Entry, Hardware, Load, Model, Parameter, Source, Tuning, tuning};
 use sapwise_scenes::Random;
 
 /// Points that a cost needs.
@@ -94,7 +92,7 @@ pub fn measured_costs_over(profile: &Profile, base: Option<&Model>) -> (Vec<Algo
         _ => format!("{} has no cost: no term explains its time", timed.id),
     };
     let warnings = lacking.map(warning).collect();
-    (observed(costs, profile, &all), warnings)
+    (corrected(&costs, profile, &all), warnings)
 }
 
 /// The costs of some algorithms by a model that is fitted to the report alone, known at the places of `base`.
@@ -136,16 +134,13 @@ fn whole(hardware: &Hardware) -> Hardware {
 }
 
 /// The costs after all timings of the report.
-fn observed(costs: Vec<AlgorithmCost>, profile: &Profile, all: &[Row]) -> Vec<AlgorithmCost> {
+fn corrected(costs: &[AlgorithmCost], profile: &Profile, all: &[Row]) -> Vec<AlgorithmCost> {
     let position = |row: &Row| costs.iter().position(|c| c.algorithm == *profile.id(row.algorithm));
     let rows: Vec<(usize, &Row)> = all.iter().filter(|r| !r.floor).filter_map(|r| Some((position(r)?, r))).collect();
-    let mut observed = Observed::new(costs);
     // At random: those of one scenario in a row would look like a machine that changes.
-    for k in Random::named(1, &["observations"]).shuffled(rows.len()) {
-        let (algorithm, row) = rows[k];
-        observed.observe(algorithm, &row.load, row.ns, noise_ln(row.behind));
-    }
-    observed.costs()
+    let shuffled = Random::named(1, &["observations"]).shuffled(rows.len());
+    let timing = |k: usize| (rows[k].0, rows[k].1.load, rows[k].1.ns, noise_ln(rows[k].1.behind));
+    tuning::corrected(costs, shuffled.into_iter().map(timing))
 }
 
 /// Replaces the interval of each crossover by the one from paired samples, where there is one.
@@ -182,7 +177,7 @@ fn measured_interval(crossover: &Crossover, report: &Report, scenario: &str) -> 
             second_ns: &point.timings[b].samples_ns,
         });
     }
-    PairedComparison::new(&points)?.interval(crossover.objects, true)
+    PairedRatio::new(&points)?.interval(crossover.objects)
 }
 
 #[cfg(test)]

@@ -1,241 +1,175 @@
-//! Figures 4, 6 and 7 of the paper: time over objects, CPU against GPU, on 1..k GPUs, on 1..k threads.
+//! Figures 4, 6 and 7 of the paper: time over objects on the CPU and GPUs, on several GPUs, and on several threads.
 
-use super::entry::{Entry, SOFTWARE, best_of_machines};
-use crate::Report;
-use crate::data::usual_scenario;
-use crate::data_table::{Cell, DataTable};
-use crate::figures::{Band, CrossoverLine, Curve, CurvePanel, CurvePoint, Curves};
-use crate::fit::measured_tuning;
-use crate::sweep::median;
-use sapwise::stats::quantile;
-use sapwise::{AlgorithmId, Backend, BackendClass, Crossover, Tuning};
+use super::{Material, Page, title};
+use crate::data::{Profile, is_real};
+use crate::figures::{Curve, CurvePanel, Curves, Field};
+use crate::fit::slice_tuning;
+use anyhow::Result;
+use sapwise::stats::{mean, median};
+use sapwise::{AlgorithmId, Backend, BackendClass, Tuning};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Machines in one picture.
-const MOST_PANELS: usize = 4;
+/// Hosts in one figure at most.
+const MOST_PANELS: usize = 6;
+/// Objects from which on a frame is large: below it fork and join make up most of it.
+const LARGE: u32 = 1000;
 
-/// Which processors a picture compares.
+/// A part of a machine that algorithms run on: some threads, or some GPUs by their numbers.
+type Side = (BackendClass, Vec<u32>);
+
+/// Which sides a figure compares.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Compared {
-    /// One core, all cores, GPUs: Figure 4.
+enum Compared {
     CpuAndGpu,
-    /// Numbers of GPUs: Figure 6.
     Gpus,
-    /// Numbers of threads: Figure 7.
     Threads,
 }
 
 impl Compared {
-    pub(super) const ALL: [Self; 3] = [Self::CpuAndGpu, Self::Gpus, Self::Threads];
+    fn takes(self, backend: &Backend) -> bool {
+        let on_gpus = backend.class() == BackendClass::Gpu;
+        self == Self::CpuAndGpu || on_gpus == (self == Self::Gpus)
+    }
 
-    /// Whether a report has more than one side to compare.
-    fn is_in(self, entry: &Entry) -> bool {
-        let timed = entry.profile.points.iter().flat_map(|p| &p.medians).map(|m| entry.profile.id(m.0));
-        let widths: BTreeSet<(BackendClass, Vec<u32>)> = timed.map(|id| side(id.backend())).collect();
-        let count = |class| widths.iter().filter(|w| w.0 == class).count();
+    fn sides(self, profile: &Profile) -> BTreeSet<Side> {
+        let available = profile.available();
+        available.iter().map(AlgorithmId::backend).filter(|b| self.takes(b)).map(side).collect()
+    }
+
+    /// Whether a profile has sides to compare.
+    fn is_in(self, profile: &Profile) -> bool {
+        let sides = self.sides(profile);
         match self {
-            Self::CpuAndGpu => count(BackendClass::Cpu) > 0 && count(BackendClass::Gpu) > 0,
-            Self::Gpus => widths.iter().any(|w| w.0 == BackendClass::Gpu && w.1.len() > 1),
-            Self::Threads => count(BackendClass::Cpu) > 1,
+            Self::CpuAndGpu => sides.iter().map(|s| s.0).collect::<BTreeSet<_>>().len() > 1,
+            Self::Gpus => sides.iter().any(|s| s.1.len() > 1),
+            Self::Threads => sides.len() > 1,
         }
-    }
-
-    fn takes(self, id: &AlgorithmId, threads: u32) -> bool {
-        match (self, id.backend()) {
-            (Self::CpuAndGpu, Backend::Cpu(k)) => *k == 1 || *k == threads,
-            (Self::CpuAndGpu, _) => true,
-            (_, backend) => (backend.class() == BackendClass::Gpu) == (self == Self::Gpus),
-        }
-    }
-
-    /// The reports that it is drawn of: of each physical machine the one that has most of it, up to four.
-    pub(super) fn drawn(self, entries: &[Entry], wanted: &[usize]) -> Vec<usize> {
-        let among = wanted.iter().copied().filter(|&k| entries[k].studied.is_ok() && self.is_in(&entries[k]));
-        let all = best_of_machines(entries, among, |e| (self.sides(e), e.wholeness()));
-        // Of many machines some, evenly taken.
-        let step = all.len().div_ceil(MOST_PANELS).max(1);
-        all.into_iter().step_by(step).collect()
-    }
-
-    fn sides(self, entry: &Entry) -> usize {
-        let ids = entry.profile.algorithms.iter().map(|t| &t.id).filter(|id| self.takes(id, entry.threads()));
-        ids.map(|id| side(id.backend())).collect::<BTreeSet<_>>().len()
-    }
-
-    pub(super) fn title(self) -> &'static str {
-        match self {
-            Self::CpuAndGpu => "CPU against GPU",
-            Self::Gpus => "On one and more GPUs",
-            Self::Threads => "On one and more threads",
-        }
-    }
-
-    pub(super) fn id(self) -> &'static str {
-        match self {
-            Self::CpuAndGpu => "figure-4-cpu-gpu",
-            Self::Gpus => "figure-6-gpus",
-            Self::Threads => "figure-7-threads",
-        }
-    }
-
-    /// The picture of these reports, each a panel. The time of each side is that of its fastest algorithm at each size.
-    pub(super) fn figure(self, drawn: &[(usize, &Entry, &Report)]) -> Curves {
-        let mut sides: BTreeSet<(BackendClass, Vec<u32>)> = BTreeSet::new();
-        for (_, entry, report) in drawn {
-            let ids = report.algorithms.iter().map(|t| &t.id).filter(|id| self.takes(id, entry.threads()));
-            sides.extend(ids.map(|id| side(id.backend())));
-        }
-        let sides: Vec<_> = sides.into_iter().collect();
-        let panels = drawn.iter().map(|(_, entry, report)| self.panel(entry, report, &sides)).collect();
-        Curves { title: self.title().to_owned(), panels }
-    }
-
-    fn panel(self, entry: &Entry, report: &Report, sides: &[(BackendClass, Vec<u32>)]) -> CurvePanel {
-        let (threads, software_gpus) = (entry.threads(), entry.software_gpus());
-        let name = |side: &(BackendClass, Vec<u32>)| name(side, &software_gpus);
-        let scenario = usual_scenario(report).to_owned();
-        let own = only(report, |id| self.takes(id, threads) && entry.profile.position(id).is_some());
-        let style = |id: &AlgorithmId| sides.iter().position(|s| *s == side(id.backend())).unwrap_or_default();
-        let mut series: Vec<Curve> = Vec::new();
-        for (k, of) in sides.iter().enumerate() {
-            let points = envelope(&own, &scenario, |id| side(id.backend()) == *of);
-            if !points.is_empty() {
-                series.push(Curve { name: name(of), style: k, points });
-            }
-        }
-        let (fields, crossovers) = match measured_tuning(&own, &scenario, None) {
-            Ok(tuning) => (bands(&tuning, style, |k| name(&sides[k])), crossover_lines(&tuning)),
-            // Too few sizes for curves; the points are drawn all the same.
-            Err(_) => (Vec::new(), Vec::new()),
-        };
-        CurvePanel { title: format!("{} ({scenario})", entry.name), series, fields, crossovers }
     }
 }
 
-/// A side by its class of processor and the numbers of the GPUs, or as one number that of the threads.
-fn side(backend: &Backend) -> (BackendClass, Vec<u32>) {
+pub(super) fn section(material: &Material, page: &mut Page, files: &mut Vec<(&str, String)>) -> Result<()> {
+    page.section("Time over objects");
+    page.text(
+        "Each curve is the fastest algorithm on that many threads or GPUs, medians over the frames of one scenario. Shades are the fields of \
+         optimal performance between the crossovers of curves that were fitted to the same timings. GPU times include the transfers.",
+    );
+    let figures = [
+        (Compared::CpuAndGpu, "figure-4-cpu-gpu.svg", "Figure 4: CPU and GPU", "no report has timings of both"),
+        (Compared::Gpus, "figure-6-gpus.svg", "Figure 6: one and several GPUs", "no report has several GPUs"),
+        (Compared::Threads, "figure-7-threads.svg", "Figure 7: one and several threads", "no report has several threads"),
+    ];
+    for (compared, file, what, lack) in figures {
+        let mut hosts = material.best_of_hosts(|p| (compared.is_in(p), compared.sides(p).len(), p.points.len()));
+        hosts.retain(|p| compared.is_in(p));
+        hosts.truncate(MOST_PANELS);
+        if hosts.is_empty() {
+            page.lacks(&format!("{what}: {lack}."));
+            continue;
+        }
+        let panels = hosts.iter().map(|p| panel(material, p, compared)).collect();
+        let time = Curves { title: what.to_owned(), x_name: "objects", y_name: "time of a frame (µs)", panels };
+        let svg = time.svg()?;
+        page.figure(file, &svg, &format!("{what}."));
+        files.push((file, svg));
+        if compared == Compared::Threads {
+            let panels = hosts.iter().map(|p| CurvePanel { curves: speed_ups(p), ..titled(p) }).collect();
+            let title = "Speed-up over the number of threads".to_owned();
+            let svg = Curves { title, x_name: "threads", y_name: "speed-up", panels }.svg()?;
+            page.figure("speed-up.svg", &svg, "Speed-up of each method over one thread, geometric mean over frames of 1000 objects or more.");
+            files.push(("speed-up.svg", svg));
+        }
+    }
+    page.text(
+        "Figure 8, the choice frame by frame beside every fixed algorithm, is drawn by `sapwise run SCENARIO --plot P.svg` on the machine \
+         itself.",
+    );
+    Ok(())
+}
+
+fn side(backend: &Backend) -> Side {
     match backend {
         Backend::Gpu(gpus) => (BackendClass::Gpu, gpus.clone()),
         other => (other.class(), vec![other.width()]),
     }
 }
 
-fn name((class, numbers): &(BackendClass, Vec<u32>), software_gpus: &[u32]) -> String {
-    match class {
-        BackendClass::Gpu if numbers.iter().any(|g| software_gpus.contains(g)) => {
-            format!("{}{SOFTWARE}", Backend::Gpu(numbers.clone()))
-        }
-        BackendClass::Cpu if numbers[..] == [1] => "1 thread".to_owned(),
-        BackendClass::Cpu => format!("{} threads", numbers[0]),
-        BackendClass::Gpu => Backend::Gpu(numbers.clone()).to_string(),
-    }
-}
-
-/// The report with some of its algorithms only.
-fn only(report: &Report, takes: impl Fn(&AlgorithmId) -> bool) -> Report {
-    let mut own = report.clone();
-    keep(&mut own, takes);
-    own
-}
-
-/// Takes all but some algorithms out of a report.
-pub(super) fn keep(report: &mut Report, takes: impl Fn(&AlgorithmId) -> bool) {
-    report.algorithms.retain(|t| takes(&t.id));
-    report.points.iter_mut().for_each(|p| p.timings.retain(|t| takes(&t.algorithm)));
-}
-
-/// At each size the median and the quartiles of the fastest of the algorithms, over the rounds.
-fn envelope(report: &Report, scenario: &str, of: impl Fn(&AlgorithmId) -> bool) -> Vec<CurvePoint> {
-    let mut sizes: BTreeMap<u32, BTreeMap<&AlgorithmId, Vec<u64>>> = BTreeMap::new();
-    for point in report.points.iter().filter(|p| p.scenario == scenario && p.load.objects > 0) {
-        for timing in point.timings.iter().filter(|t| of(&t.algorithm) && t.error.is_none() && !t.samples_ns.is_empty())
-        {
-            let samples = sizes.entry(point.load.objects).or_default().entry(&timing.algorithm).or_default();
-            samples.extend(&timing.samples_ns);
+fn name(profile: &Profile, (class, numbers): &Side) -> String {
+    match (class, &numbers[..]) {
+        (BackendClass::Cpu, [1]) => "1 thread".to_owned(),
+        (BackendClass::Cpu, threads) => format!("{} threads", threads[0]),
+        (BackendClass::Gpu, gpus) => {
+            let own = profile.hardware.gpus.iter().filter(|g| gpus.contains(&g.gpu.index));
+            let software = if own.clone().all(is_real) { "" } else { " (software)" };
+            format!("{}{software}", Backend::Gpu(gpus.to_vec()))
         }
     }
-    let fastest = |(objects, algorithms): (u32, BTreeMap<&AlgorithmId, Vec<u64>>)| {
-        let medians = algorithms.into_values().filter_map(|samples| Some((median(&samples)?, samples)));
-        let (ns, samples) = medians.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        let samples: Vec<f64> = samples.into_iter().map(|ns| ns as f64).collect();
-        let [low_ns, high_ns] = [0.25, 0.75].map(|share| quantile(&samples, share).unwrap_or(ns));
-        Some(CurvePoint { objects: f64::from(objects), ns, low_ns, high_ns })
-    };
-    sizes.into_iter().filter_map(fastest).collect()
 }
 
-/// The steps of the slice, those in a row that are of the same side joined.
-fn bands(tuning: &Tuning, style: impl Fn(&AlgorithmId) -> usize, name: impl Fn(usize) -> String) -> Vec<Band> {
-    let mut bands: Vec<Band> = Vec::new();
+fn titled(profile: &Profile) -> CurvePanel {
+    CurvePanel { title: format!("{} ({})", title(profile), profile.usual_scenario()), ..CurvePanel::default() }
+}
+
+fn panel(material: &Material, profile: &Profile, compared: Compared) -> CurvePanel {
+    let curve = |side_: &Side| Curve { name: name(profile, side_), points: fastest(profile, side_) };
+    let curves = compared.sides(profile).iter().map(curve).collect();
+    let at = material.profiles.iter().position(|p| std::ptr::eq(p, profile));
+    let tuning = at.and_then(|k| material.tunings[k].as_ref());
+    let fields = tuning.map(|tuning| fields(profile, tuning, compared)).unwrap_or_default();
+    CurvePanel { curves, fields, ..titled(profile) }
+}
+
+/// At each size the median time in µs of the fastest algorithm of a side.
+fn fastest(profile: &Profile, of: &Side) -> Vec<(f64, f64)> {
+    let mut sizes: BTreeMap<u32, BTreeMap<u16, Vec<f64>>> = BTreeMap::new();
+    for spot in profile.points.iter().filter(|s| s.scenario == profile.usual_scenario()) {
+        for &(k, ns) in spot.medians.iter().filter(|m| side(profile.id(m.0).backend()) == *of) {
+            sizes.entry(spot.load.objects).or_default().entry(k).or_default().push(ns / 1e3);
+        }
+    }
+    let least = |rounds: BTreeMap<u16, Vec<f64>>| rounds.values().filter_map(|us| median(us)).min_by(f64::total_cmp);
+    sizes.into_iter().filter_map(|(objects, rounds)| Some((f64::from(objects), least(rounds)?))).collect()
+}
+
+/// The fields between the sides that are compared, by the measured costs of their algorithms.
+fn fields(profile: &Profile, tuning: &Tuning, compared: Compared) -> Vec<Field> {
+    let mut fields: Vec<Field> = Vec::new();
+    let own = tuning.costs.iter().filter(|c| compared.takes(c.algorithm.backend())).cloned().collect();
+    let scenario = profile.usual_scenario();
+    let Ok(tuning) = slice_tuning(own, scenario, &profile.slice(scenario)) else { return fields };
     for step in &tuning.steps {
-        let (from, style) = (f64::from(step.from_objects), style(&step.algorithm));
-        match bands.last_mut() {
-            Some(last) if last.style == style => {}
+        let name = name(profile, &side(step.algorithm.backend()));
+        let from = f64::from(step.from_objects);
+        match fields.last_mut() {
+            Some(last) if last.name == name => {}
             last => {
-                if let Some(last) = last {
-                    last.to = from;
-                }
-                bands.push(Band { from, to: f64::INFINITY, style, name: name(style) });
+                last.into_iter().for_each(|last| last.to = from);
+                fields.push(Field { name, from, to: f64::INFINITY });
             }
         }
     }
-    bands
+    fields
 }
 
-/// The crossovers between sides.
-fn crossover_lines(tuning: &Tuning) -> Vec<CrossoverLine> {
-    let apart = tuning.crossovers.iter().filter(|b| side(b.below.backend()) != side(b.above.backend()));
-    let line = |b: &Crossover| {
-        let (low, high) = b.interval().unwrap_or((b.objects, b.objects));
-        CrossoverLine { objects: b.objects, low, high }
+/// For each method the speed-up on each number of threads over one thread, at large frames at which both were timed.
+fn speed_ups(profile: &Profile) -> Vec<Curve> {
+    let mut ratios: BTreeMap<&str, BTreeMap<u32, Vec<f64>>> = BTreeMap::new();
+    for spot in profile.points.iter().filter(|s| s.load.objects >= LARGE) {
+        for &(k, ns) in &spot.medians {
+            let id = profile.id(k);
+            let is_single = |m: &&(u16, f64)| {
+                profile.id(m.0).method() == id.method() && *profile.id(m.0).backend() == Backend::Cpu(1)
+            };
+            let single = spot.medians.iter().find(is_single);
+            if let (Backend::Cpu(threads), Some((_, one))) = (id.backend(), single) {
+                ratios.entry(id.method()).or_default().entry(*threads).or_default().push((one / ns).ln());
+            }
+        }
+    }
+    let curve = |(method, threads): (&str, BTreeMap<u32, Vec<f64>>)| Curve {
+        name: method.to_owned(),
+        points: threads.into_iter().map(|(threads, ln)| (f64::from(threads), mean(&ln).exp())).collect(),
     };
-    apart.map(line).collect()
-}
-
-/// What the panels show as tables: the times, the fields and the crossovers. `drawn` are the reports of the panels, by position.
-pub(super) fn tables(figure: &Curves, drawn: &[(usize, &Entry, &Report)]) -> [DataTable; 3] {
-    let heads = [("machine", "machine"), ("scenario", "scenario")];
-    let mut times = DataTable::new([
-        heads[0],
-        heads[1],
-        ("on", "side"),
-        ("objects", "objects"),
-        ("median time (ns)", "median_ns"),
-        ("lower quartile (ns)", "lower_quartile_ns"),
-        ("upper quartile (ns)", "upper_quartile_ns"),
-    ]);
-    let mut fields = DataTable::new([
-        heads[0],
-        heads[1],
-        ("on", "side"),
-        ("from (objects)", "from_objects"),
-        ("to (objects)", "to_objects"),
-    ]);
-    let mut crossovers = DataTable::new([
-        heads[0],
-        heads[1],
-        ("crossover (objects)", "objects"),
-        ("interval from (objects)", "low_objects"),
-        ("interval to (objects)", "high_objects"),
-    ]);
-    for (panel, (k, entry, report)) in figure.panels.iter().zip(drawn) {
-        let heads = || [&entry.name[..], usual_scenario(report)].map(Cell::text).to_vec();
-        for curve in &panel.series {
-            for p in &curve.points {
-                let figures = [p.objects, p.ns, p.low_ns, p.high_ns].map(Cell::exact);
-                times.push([heads(), vec![Cell::text(&curve.name)], figures.to_vec()].concat(), &[*k]);
-            }
-        }
-        for field in &panel.fields {
-            let figures = [field.from, field.to].map(Cell::exact);
-            fields.push([heads(), vec![Cell::text(&field.name)], figures.to_vec()].concat(), &[*k]);
-        }
-        for crossover in &panel.crossovers {
-            let figures = [crossover.objects, crossover.low, crossover.high].map(Cell::exact);
-            crossovers.push([heads(), figures.to_vec()].concat(), &[*k]);
-        }
-    }
-    [times, fields, crossovers]
+    ratios.into_iter().map(curve).collect()
 }
 
 #[cfg(test)]
@@ -243,43 +177,28 @@ mod tests {
     use super::*;
     use crate::synthetic::Machine;
 
-    fn entry(machine: &Machine) -> (Entry, Report) {
-        let report = machine.report();
-        (Entry::new(std::path::Path::new("a.json"), "a.json", report.clone(), Ok(())), report)
+    #[test]
+    fn curves_are_the_fastest_of_each_side_and_fields_follow_each_other() {
+        let reports = vec![("a.json".to_owned(), Machine::family()[2].report())];
+        let material = Material::new(reports, &crate::progress::Silent).unwrap();
+        let profile = &material.profiles[0];
+        assert!(Compared::Threads.is_in(profile) && !Compared::Gpus.is_in(profile) && !Compared::CpuAndGpu.is_in(profile));
+        let panel = panel(&material, profile, Compared::Threads);
+        assert!(panel.curves.len() > 1 && panel.curves[0].name == "1 thread", "{panel:?}");
+        let spot = profile.points.iter().find(|s| s.scenario == profile.usual_scenario()).unwrap();
+        let single = spot.medians.iter().filter(|m| profile.id(m.0).threads() == 1).map(|m| m.1 / 1e3);
+        let least = single.min_by(f64::total_cmp).unwrap();
+        assert!(panel.curves[0].points.contains(&(f64::from(spot.load.objects), least)), "{panel:?}");
+        let joined = |w: &[Field]| w[0].to == w[1].from && w[0].name != w[1].name;
+        assert!(panel.fields.len() > 1 && panel.fields.windows(2).all(joined), "{panel:?}");
     }
 
     #[test]
-    fn sides_are_their_fastest_algorithm_with_the_fields_behind() {
-        let (entry, report) = entry(&Machine::family()[2]);
-        let curves = Compared::Threads.figure(&[(0, &entry, &report)]);
-        let panel = &curves.panels[0];
-        let names: Vec<&str> = panel.series.iter().map(|s| s.name.as_str()).collect();
-        assert!(names.len() > 1 && names[0] == "1 thread", "{names:?}");
-        for point in &panel.series[0].points {
-            let of = |p: &&crate::report::Point| {
-                f64::from(p.load.objects) == point.objects && p.scenario == usual_scenario(&report)
-            };
-            let timings = report.points.iter().filter(of).flat_map(|p| &p.timings);
-            let single = timings.filter(|t| *t.algorithm.backend() == Backend::Cpu(1));
-            let least = single.filter_map(|t| median(&t.samples_ns)).min_by(f64::total_cmp).unwrap();
-            assert!(
-                point.ns <= least * 1.001 && point.low_ns <= point.ns && point.ns <= point.high_ns,
-                "{point:?} {least}"
-            );
+    fn one_thread_has_no_speed_up() {
+        let profile = Profile::of("a.json", &Machine::family()[2].report());
+        for curve in speed_ups(&profile) {
+            assert!((curve.points[0].1 - 1.0).abs() < 1e-12, "{curve:?}");
+            assert!(curve.points.iter().all(|p| p.1 > 0.5 && p.1 < p.0 + 0.5), "{curve:?}");
         }
-        // Bands follow each other, and between two of them is a crossover.
-        assert!(
-            panel.fields.len() > 1 && panel.fields.windows(2).all(|w| w[0].to == w[1].from && w[0].style != w[1].style)
-        );
-        assert!(panel.crossovers.len() >= panel.fields.len() - 1);
-        assert!(!Compared::Gpus.is_in(&entry) && !Compared::CpuAndGpu.is_in(&entry) && Compared::Threads.is_in(&entry));
-    }
-
-    #[test]
-    fn of_a_machine_the_report_with_most_sides_is_drawn() {
-        let (mut few, _) = entry(&Machine::family()[2]);
-        few.profile.retain(|t| t.id.threads() == 1);
-        let (all, _) = entry(&Machine::family()[2]);
-        assert_eq!(Compared::Threads.drawn(&[few, all], &[0, 1]), [1]);
     }
 }

@@ -1,6 +1,4 @@
-//! What a sweep is, measured or simulated: which scenarios and sizes, under which loads, and which algorithms drop out.
-//!
-//! The command measures by these rules, and [`simulated`](crate::simulated) makes reports by the same ones.
+//! What a sweep is: which scenarios and sizes, under which loads, and which algorithms drop out.
 
 mod dropout;
 mod loads;

@@ -55,8 +55,6 @@ pub(super) struct Extent {
 struct OfTuning<'a> {
     from: OriginKind,
     model: &'a Option<String>,
-    /// Samples by which a prediction was corrected.
-    samples: usize,
     /// The processor of the other machine whose report they come from.
     other_machine: &'a Option<String>,
     /// Algorithms with more threads than this machine has cores, which are left out.
@@ -179,7 +177,6 @@ impl<'a> Answer<'a> {
             tuning: OfTuning {
                 from: origin.from,
                 model: &origin.tuning.model,
-                samples: origin.tuning.samples.len(),
                 other_machine: &origin.other_machine,
                 too_many_threads: too_wide,
             },

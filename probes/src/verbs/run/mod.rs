@@ -7,15 +7,14 @@ mod tuning;
 use crate::algorithms::Algorithms;
 use crate::args::{Run, Scene};
 use crate::exit::{Outcome, WrongUsage};
-use crate::outputs::picture_format;
+use crate::outputs::check_picture;
 use crate::replay::{FrameSource, ReplaySettings, Swing, check_trace, picture, replay, too_wide, write_trace};
 use crate::terminal::Terminal;
 use crate::{interrupt, output, outputs};
 use anyhow::{Context, bail};
 use sapwise::usable_cores;
-use sapwise_lab::figures::Figure;
 use sapwise_lab::text::count;
-use sapwise_lab::write::write_atomically;
+use sapwise_lab::write::write_text;
 use sapwise_scenes::{Frames, Scenario};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -31,7 +30,7 @@ pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Ou
     let mut registry = algorithms.registry(usable_cores());
     registry.pin_threads();
     arguments.trace.as_deref().map_or(Ok(()), check_trace)?;
-    let plot = arguments.plot.as_deref().map(|path| Ok::<_, WrongUsage>((path, picture_format(path)?))).transpose()?;
+    arguments.plot.as_deref().map_or(Ok(()), check_picture)?;
     check_outputs(arguments)?;
     let mut settings = settings(arguments)?;
     let cuts = cuts(arguments, settings.frames)?;
@@ -65,19 +64,15 @@ pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Ou
     if let Some(path) = &arguments.trace {
         write_trace(path, &outcome)?;
     }
-    let mut not_drawn = None;
-    if let Some((path, format)) = plot {
-        let picture = picture(&settings, &outcome);
-        not_drawn = text::not_drawn(&picture);
-        let drawn = picture.draw(format, &text::caption(arguments, &answer, &origin, not_drawn.as_deref()))?;
-        write_atomically(path, |out| Ok(out.write_all(&drawn)?))?;
+    if let Some(path) = &arguments.plot {
+        write_text(path, &picture(&settings, &outcome, text::caption(arguments, &answer, &origin)).svg()?)?;
     }
     if arguments.json {
         output::print_json(&answer)?;
     } else {
-        output::print(&text::text(arguments, &answer, &origin, not_drawn.as_deref(), Terminal::of_standard_output()))?;
+        output::print(&text::text(arguments, &answer, &origin, Terminal::of_standard_output()))?;
     }
-    Ok(if outcome.interrupted || origin.wrong { Outcome::Failed } else { Outcome::Done })
+    Ok(if outcome.interrupted { Outcome::Failed } else { Outcome::Done })
 }
 
 /// Refuses what can't be written: after the run its figures would be lost with the file.

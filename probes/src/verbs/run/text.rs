@@ -6,18 +6,11 @@ use crate::args::{Run, Scene};
 use crate::replay::WINDOW;
 use crate::shell;
 use crate::terminal::Terminal;
-use sapwise_lab::figures::ReplayPicture;
 use sapwise_lab::text::{count, duration, grouped, grouped_count};
 use std::path::Path;
 
-/// Totals, figures, what there is to say about them and about the picture, and what to do next.
-pub(super) fn text(
-    arguments: &Run,
-    answer: &Answer<'_>,
-    origin: &Origin,
-    not_drawn: Option<&str>,
-    terminal: Terminal,
-) -> String {
+/// Totals, figures, what there is to say about them, and what to do next.
+pub(super) fn text(arguments: &Run, answer: &Answer<'_>, origin: &Origin, terminal: Terminal) -> String {
     let head = format!(
         "{}, {} of {}, medians of {}, verified against each other",
         answer.scenario,
@@ -53,9 +46,6 @@ pub(super) fn text(
     for (verb, path) in [("Recorded", &arguments.record), ("Traced", &arguments.trace), ("Drawn", &arguments.plot)] {
         text += &path.as_ref().map(|p| format!("\n{verb} in {}.", p.display())).unwrap_or_default();
     }
-    if let Some(not_drawn) = not_drawn {
-        text += &format!(" {not_drawn}");
-    }
     text + &format!("\nNext: {}", next_step(arguments, origin))
 }
 
@@ -72,18 +62,11 @@ fn next_step(arguments: &Run, origin: &Origin) -> String {
     }
 }
 
-/// Which algorithms a picture leaves out and why, where it leaves out any.
-pub(super) fn not_drawn(picture: &ReplayPicture) -> Option<String> {
-    let names: Vec<String> = picture.not_drawn().iter().map(ToString::to_string).collect();
-    let why = "it shows the algorithms that ran in most frames, and the fastest on each number of threads or GPUs";
-    (!names.is_empty()).then(|| format!("Not in the picture: {}; {why}.", names.join(", ")))
-}
-
-/// What stands below the picture: the figures, where the tuning comes from, what is not drawn, and the command that makes it again.
-pub(super) fn caption(arguments: &Run, answer: &Answer<'_>, origin: &Origin, not_drawn: Option<&str>) -> Vec<String> {
+/// What stands below the picture: the figures, where the tuning comes from, and the command that makes it again.
+pub(super) fn caption(arguments: &Run, answer: &Answer<'_>, origin: &Origin) -> Vec<String> {
     let Figures { switches, explored, .. } = answer.figures;
     let name = answer.scenario;
-    let mut caption = vec![
+    vec![
         format!(
             "{name}: regret {}; {switches} switch{}, {} explored; times over {}, decisions of the last",
             spread(&answer.figures),
@@ -92,10 +75,8 @@ pub(super) fn caption(arguments: &Run, answer: &Answer<'_>, origin: &Origin, not
             count(answer.repeats, "repeat")
         ),
         format!("Tuning: {}. {}", origin.text(), learning(answer)),
-    ];
-    caption.extend(not_drawn.map(str::to_owned));
-    caption.push(format!("Made by: {}", command(arguments)));
-    caption
+        format!("Made by: {}", command(arguments)),
+    ]
 }
 
 fn extent(answer: &Answer<'_>) -> String {
@@ -231,10 +212,7 @@ fn command(arguments: &Run) -> String {
         Scene::Scenario(scenario) => scenario.to_string(),
         Scene::Stream(path) => name(path),
     });
-    match &arguments.tuning {
-        Some(path) => words.push(format!("--tuning {}", name(path))),
-        None => words.push(format!("--samples {}", arguments.samples)),
-    }
+    words.extend(arguments.tuning.as_deref().map(|path| format!("--tuning {}", name(path))));
     words.extend(arguments.objects.map(|n| format!("--objects {n}")));
     words.extend(arguments.swing.map(|least| format!("--swing {least}")));
     words.extend(arguments.frames.map(|n| format!("--frames {n}")));
@@ -264,10 +242,10 @@ mod tests {
             _ => panic!("another verb"),
         };
         for words in [
-            "sapwise run slab --samples 8 --repeats 6 --seed 1",
+            "sapwise run slab --repeats 6 --seed 1",
             "sapwise run uniform --tuning t.json --objects 9 --swing 3 --frames 7 --repeats 2 --seed 4 --no-gpus",
-            "sapwise run s.npy --samples 0 --repeats 1 --seed 1 --co-runner 3:2 --no-learning --no-exploring --plot p.png",
-            "sapwise run mixed --samples 8 --repeats 6 --seed 1 --gpu 0 --gpu 2 --plot p.svg",
+            "sapwise run s.npy --repeats 1 --seed 1 --co-runner 3:2 --no-learning --no-exploring --plot p.svg",
+            "sapwise run mixed --repeats 6 --seed 1 --gpu 0 --gpu 2 --plot p.svg",
         ] {
             assert_eq!(said(words), words);
         }

@@ -20,8 +20,6 @@ pub(super) struct Origin {
     pub(super) from: OriginKind,
     /// The processor of the other machine whose report it comes from.
     pub(super) other_machine: Option<String>,
-    /// An algorithm returned wrong pairs while it was sampled.
-    pub(super) wrong: bool,
 }
 
 /// What it was taken from.
@@ -39,15 +37,10 @@ pub(super) enum OriginKind {
 impl Origin {
     /// Where the tuning comes from, in a sentence.
     pub(super) fn text(&self) -> String {
-        let Tuning { source, model, samples, .. } = &self.tuning;
+        let Tuning { source, model, .. } = &self.tuning;
         let model = model.as_ref().map_or(String::new(), |name| format!(" by the model {name}"));
-        let corrected = match samples.len() {
-            0 => String::new(),
-            1 => ", corrected by 1 sample".to_owned(),
-            count => format!(", corrected by {count} samples"),
-        };
         match (self.from, source) {
-            (OriginKind::Prediction, _) => format!("predicted for this machine{model}{corrected}"),
+            (OriginKind::Prediction, _) => format!("predicted for this machine{model}"),
             (OriginKind::Report, _) => match &self.other_machine {
                 Some(cpu) => format!("measured on another machine ({cpu})"),
                 None => "measured on this machine".to_owned(),
@@ -55,10 +48,7 @@ impl Origin {
             (OriginKind::Tuning, Source::Default) => "from a file, written by hand".to_owned(),
             (OriginKind::Tuning, Source::Predicted) => format!("from a file, predicted{model}"),
             (OriginKind::Tuning, Source::Measured) => "from a file, measured".to_owned(),
-            (OriginKind::Tuning, Source::Learned) if samples.is_empty() => {
-                format!("from a file, learned on line{model}")
-            }
-            (OriginKind::Tuning, Source::Learned) => format!("from a file, predicted{model}{corrected}"),
+            (OriginKind::Tuning, Source::Learned) => format!("from a file, learned on line{model}"),
             (OriginKind::Tuning, _) => "from a file".to_owned(),
         }
     }
@@ -72,17 +62,9 @@ pub(super) fn predicted(arguments: &Run, algorithms: &Algorithms) -> anyhow::Res
     let (hardware, measured) = measure_hardware(None, &arguments.gpus)?;
     let model = prediction::model(None)?;
     let (usable, slice) = (&measured.usable, Slice::of(Scenario::Uniform)?);
-    let (mut tuning, wrong) = match arguments.samples {
-        0 => (prediction::predict(&model.model, &hardware, usable, &slice, algorithms)?, false),
-        most => prediction::predict_and_sample(&model.model, &hardware, usable, &slice, algorithms, most)?,
-    };
-    prediction::advise(
-        &mut tuning,
-        "this machine is unlike those of training: correct the prediction with --samples 8, or measure everything with `sapwise probe --out R.json` \
-         and give that report with --tuning",
-    );
+    let mut tuning = prediction::predict(&model.model, &hardware, usable, &slice, algorithms)?;
     tuning.warnings.extend(measured.remarks);
-    Ok(Origin { tuning, from: OriginKind::Prediction, other_machine: None, wrong })
+    Ok(Origin { tuning, from: OriginKind::Prediction, other_machine: None })
 }
 
 /// The tuning of a file, which may be a report whose timings they are measured from.
@@ -97,7 +79,7 @@ pub(super) fn read(path: &Path, registry: &Registry, choice: &GpuChoice) -> anyh
     match read_document(path, &output::warn)? {
         Document::Tuning(tuning) => {
             fresh(revisions::stale_in_tuning(&tuning, registry))?;
-            Ok(Origin { tuning: *tuning, from: OriginKind::Tuning, other_machine: None, wrong: false })
+            Ok(Origin { tuning: *tuning, from: OriginKind::Tuning, other_machine: None })
         }
         Document::Report(mut report) => {
             choice.restrict(&mut report);
@@ -107,7 +89,7 @@ pub(super) fn read(path: &Path, registry: &Registry, choice: &GpuChoice) -> anyh
             let machine = &report.hardware.machine;
             let here = machine.physical_id == measure::machine().physical_id;
             let other_machine = (!here).then(|| machine.cpu.clone());
-            Ok(Origin { tuning, from: OriginKind::Report, other_machine, wrong: false })
+            Ok(Origin { tuning, from: OriginKind::Report, other_machine })
         }
         _ => bail!("{} is a model; name a tuning file or a report, or leave out --tuning to predict", path.display()),
     }

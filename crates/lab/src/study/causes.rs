@@ -1,0 +1,142 @@
+//! Figures 10 and 11 of the paper: hardware parameters beside speed, and their influence on the crossovers.
+
+use super::machines::PAPER;
+use super::{Material, Page, title};
+use crate::data::{COMPARED, Profile, is_real};
+use crate::evaluate::influences;
+use crate::figures::{Matrix, Ratios};
+use crate::report::Label;
+use anyhow::Result;
+use sapwise::stats::mean;
+use sapwise::{AlgorithmId, GpuHardware};
+use std::collections::BTreeMap;
+
+/// Points that two hosts must share for a speed-up.
+const FEWEST_POINTS: usize = 5;
+/// Objects from which on a frame counts for a speed-up.
+const LARGE: u32 = 1000;
+/// Crossovers that are shown at most.
+const MOST_CROSSOVERS: usize = 16;
+
+pub(super) fn section(material: &Material, page: &mut Page, files: &mut Vec<(&str, String)>) -> Result<()> {
+    page.section("What parameters go with");
+    let hosts = material.whole_hosts();
+    match &hosts[..] {
+        [reference, others @ ..] if !others.is_empty() => {
+            let svg = cpus(reference, others).svg()?;
+            let caption = "Figures 10 and 11 for CPUs: parameters over those of the reference, and how many times as fast each method is on \
+                           one thread, geometric mean over shared frames of 1000 objects or more.";
+            page.figure("figure-10-cpus.svg", &svg, caption);
+            files.push(("figure-10-cpus.svg", svg));
+        }
+        _ => page.lacks("Figures 10 and 11 for CPUs: it takes two hosts."),
+    }
+    let published = material.reports.iter().filter(|(_, r)| r.label == Label::Published);
+    let measured = material.reports.iter().filter(|(_, r)| r.label != Label::Published);
+    let all: Vec<&GpuHardware> =
+        published.chain(measured).flat_map(|(_, r)| &r.hardware.gpus).filter(|g| is_real(g)).collect();
+    match &all[..] {
+        [reference, others @ ..] if !others.is_empty() => {
+            let svg = gpus(reference, others).svg()?;
+            page.figure("figure-10-gpus.svg", &svg, "Figures 10 and 11 for GPUs: the paper's parameters over those of the reference.");
+            files.push(("figure-10-gpus.svg", svg));
+        }
+        _ => page.lacks("Figures 10 and 11 for GPUs: it takes two GPUs; datasets/published holds those of the paper."),
+    }
+    let mut found = influences(&material.profiles)?;
+    found.truncate(MOST_CROSSOVERS);
+    if found.is_empty() {
+        page.lacks("Influence on crossovers: no crossover was measured on three hosts and in more reports than parameters.");
+        return Ok(());
+    }
+    let mut columns: Vec<&str> = found.iter().flat_map(|i| &i.rises).map(|r| r.0).collect();
+    columns.sort_unstable();
+    columns.dedup();
+    let row = |i: &crate::evaluate::Influence| {
+        let of = |column: &&str| i.rises.iter().find(|r| r.0 == *column).map(|r| r.1);
+        (format!("{} ({} reports, {:.2})", i.crossover, i.reports, i.error_octaves), columns.iter().map(of).collect())
+    };
+    let matrix = Matrix {
+        title: "Influence of parameters on crossovers, in octaves".to_owned(),
+        columns: columns.iter().map(|c| (*c).to_owned()).collect(),
+        rows: found.iter().map(row).collect(),
+    };
+    let svg = matrix.svg()?;
+    let caption = "Crossovers regressed on the logarithms of parameters by least squares. In parentheses the mean error of the fit; in the cells \
+                   how much it rises when the values of one parameter are exchanged between reports, the mean over 30 permutations. An empty \
+                   cell: the regression does not read that parameter.";
+    page.figure("figure-11-influence.svg", &svg, caption);
+    files.push(("figure-11-influence.svg", svg));
+    Ok(())
+}
+
+fn cpus(reference: &Profile, others: &[&Profile]) -> Ratios {
+    let parameter = |id: sapwise::hardware::ParameterId| {
+        let ratio = |p: &&Profile| ratio(p.hardware.value(id), reference.hardware.value(id));
+        (id.as_str().replace('_', " "), others.iter().map(ratio).collect())
+    };
+    let mut rows: Vec<(String, Vec<Option<f64>>)> = COMPARED.into_iter().map(parameter).collect();
+    let faster: Vec<_> = others.iter().map(|p| speed_ups(reference, p)).collect();
+    for id in reference.available().into_iter().filter(|id| id.threads() == 1 && !faster.iter().all(|f| !f.contains_key(id))) {
+        let ratios = faster.iter().map(|f| f.get(&id).copied()).collect();
+        rows.push((format!("speed of {}", id.method()), ratios));
+    }
+    Ratios {
+        title: format!("Parameters and speed over those of {}", title(reference)),
+        machines: others.iter().map(|p| title(p).to_owned()).collect(),
+        rows,
+    }
+}
+
+fn gpus(reference: &GpuHardware, others: &[&GpuHardware]) -> Ratios {
+    let row = |(name, id): (&str, sapwise::hardware::GpuParameterId)| {
+        let ratios = others.iter().map(|g| ratio(g.value(id), reference.value(id)));
+        (name.to_owned(), ratios.collect())
+    };
+    Ratios {
+        title: format!("Parameters of GPUs over those of {}", reference.gpu.name),
+        machines: others.iter().map(|g| g.gpu.name.clone()).collect(),
+        rows: PAPER.into_iter().map(row).collect(),
+    }
+}
+
+fn ratio(value: Option<f64>, reference: Option<f64>) -> Option<f64> {
+    value.zip(reference).map(|(value, reference)| value / reference).filter(|r| r.is_finite() && *r > 0.0)
+}
+
+/// How many times as fast each algorithm is on another host.
+fn speed_ups(reference: &Profile, other: &Profile) -> BTreeMap<AlgorithmId, f64> {
+    let mut ratios: BTreeMap<AlgorithmId, Vec<f64>> = BTreeMap::new();
+    for spot in reference.points.iter().filter(|s| s.load.objects >= LARGE) {
+        let alike = |o: &&crate::data::Spot| (&o.scenario, o.load.objects) == (&spot.scenario, spot.load.objects);
+        let Some(theirs) = other.points.iter().find(alike) else { continue };
+        for &(k, ns) in &spot.medians {
+            let id = reference.id(k);
+            if let Some(other_ns) = other.position(id).and_then(|k| theirs.of_position(k)) {
+                ratios.entry(id.clone()).or_default().push((ns / other_ns).ln());
+            }
+        }
+    }
+    ratios.retain(|_, ln| ln.len() >= FEWEST_POINTS);
+    ratios.into_iter().map(|(id, ln)| (id, mean(&ln).exp())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synthetic::Machine;
+
+    #[test]
+    fn a_slower_copy_of_a_machine_is_slower_by_its_factor() {
+        let fast = Profile::of("a.json", &Machine::family()[2].clone().exact().report());
+        let mut slow = fast.clone();
+        slow.points.iter_mut().flat_map(|s| &mut s.medians).for_each(|m| m.1 *= 3.0);
+        let found = speed_ups(&slow, &fast);
+        assert!(!found.is_empty() && found.values().all(|r| (r - 3.0).abs() < 1e-9), "{found:?}");
+        let ratios = cpus(&slow, &[&fast]);
+        assert!(ratios.rows.iter().all(|(name, r)| {
+            let expected = if name.starts_with("speed") { 3.0 } else { 1.0 };
+            r[0].is_none_or(|r| (r - expected).abs() < 1e-9)
+        }));
+    }
+}

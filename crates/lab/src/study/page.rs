@@ -1,0 +1,87 @@
+//! The page: one HTML file that loads nothing.
+
+use crate::figures::plain;
+use std::fmt::Write;
+
+/// What stands before the sections. The name of the generator marks a folder as that of a study.
+pub(super) const HEAD: &str = "<!doctype html>
+<html lang=\"en\">
+<head>
+<meta charset=\"utf-8\">
+<meta name=\"generator\" content=\"sapwise study\">
+<meta name=\"viewport\" content=\"width=device-width\">
+<title>Sapwise study</title>
+<style>
+body { font: 16px/1.4 sans-serif; max-width: 1400px; margin: auto; padding: 1em; color: #000; background: #fff }
+figure { margin: 1em 0 } figure svg { max-width: 100%; height: auto }
+.wide { overflow-x: auto } table { border-collapse: collapse } caption { text-align: left; padding: .4em 0 }
+th, td { border-bottom: 1px solid #ccc; padding: .2em .6em; text-align: right; white-space: nowrap }
+th:first-child, td:first-child { text-align: left }
+.lacks { font-style: italic }
+</style>
+</head>
+<body>
+<h1>Hardware against broad-phase performance</h1>
+";
+
+/// A page under way.
+#[derive(Debug, Default)]
+pub(super) struct Page {
+    body: String,
+    /// What could not be shown, and why.
+    pub(super) missing: Vec<String>,
+}
+
+impl Page {
+    pub(super) fn section(&mut self, title: &str) {
+        self.push(format_args!("<h2>{}</h2>", escaped(title)));
+    }
+
+    pub(super) fn text(&mut self, text: &str) {
+        self.push(format_args!("<p>{}</p>", escaped(text)));
+    }
+
+    /// Says what is missing and why.
+    pub(super) fn lacks(&mut self, what: &str) {
+        self.push(format_args!("<p class=\"lacks\">{}</p>", escaped(what)));
+        self.missing.push(what.to_owned());
+    }
+
+    /// Shows a figure with a link to its file.
+    pub(super) fn figure(&mut self, file: &str, svg: &str, caption: &str) {
+        let caption = escaped(caption);
+        self.push(format_args!(
+            "<figure>\n{svg}<figcaption>{caption} <a href=\"{file}\">{file}</a></figcaption>\n</figure>"
+        ));
+    }
+
+    /// Shows a table, the first row its head.
+    pub(super) fn table(&mut self, caption: &str, rows: &[Vec<String>]) {
+        let caption = escaped(caption);
+        self.push(format_args!("<div class=\"wide\"><table><caption>{caption}</caption>{}</table></div>", html(rows)));
+    }
+
+    pub(super) fn finish(self) -> String {
+        format!("{HEAD}{}</body>\n</html>\n", self.body)
+    }
+
+    fn push(&mut self, html: std::fmt::Arguments<'_>) {
+        // A string takes everything.
+        let _ = writeln!(self.body, "{html}");
+    }
+}
+
+/// The rows of a table, the first one its head.
+fn html(rows: &[Vec<String>]) -> String {
+    let row = |(k, row): (usize, &Vec<String>)| {
+        let tag = if k == 0 { "th" } else { "td" };
+        let cells: String = row.iter().map(|cell| format!("<{tag}>{}</{tag}>", escaped(cell))).collect();
+        format!("\n<tr>{cells}</tr>")
+    };
+    rows.iter().enumerate().map(row).collect()
+}
+
+/// Text that no browser takes for markup.
+fn escaped(text: &str) -> String {
+    plain(text).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
