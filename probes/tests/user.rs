@@ -93,7 +93,7 @@ fn names(list: &Value) -> Vec<&str> {
 /// one that runs tests is not.
 fn probed(folder: &Path) -> PathBuf {
     let path = folder.join("report.json");
-    let words = ["probe", "--no-gpus", "--scenario", "uniform", "--max-objects", "1000", "--out"];
+    let words = ["probe", "--no-gpus", "--quick", "--scenario", "uniform", "--max-objects", "1000", "--out"];
     success(user().args(words).arg(&path));
     let mut report = read(&path);
     report["provenance"]["optimised"] = true.into();
@@ -124,7 +124,7 @@ fn from_the_probe_to_the_run_as_one_of_ours() {
     let points = told["points"].as_array().unwrap();
     let timings = points.iter().flat_map(|p| p["timings"].as_array().unwrap());
     let own: Vec<&Value> = timings.filter(|t| t["algorithm"] == "sweep@cpu1").collect();
-    assert!(own.len() >= 8 && own.iter().all(|t| t["error"].is_null()), "{own:?}");
+    assert!(own.len() >= 6 && own.iter().all(|t| t["error"].is_null()), "{own:?}");
 
     let model = file("model.json");
     success(user().arg("train").arg(&report).arg("--out").arg(&model));
