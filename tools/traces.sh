@@ -24,8 +24,8 @@ trap 'rm -rf "$work"' EXIT
 record() {
     local scenario=$1 objects=$2 more=$3
     shift 3
-    "$sapwise" run "$scenario" --objects "$objects" "$@" --seed "$seed" --repeats 1 --no-gpus --tuning "$work/tuning.json" \
-        --trace "$work/trace.csv" >/dev/null
+    "$sapwise" run "$scenario" --objects "$objects" "$@" --seed "$seed" --repeats 1 --no-gpus \
+        --tuning "$work/tuning.json" --trace "$work/trace.csv" >/dev/null
     awk -F, 'NR == 1 { for (k = 1; k <= NF; k++) if ($k ~ /@|^objects$|^pairs$/) kept[++n] = k }
         {
             for (k = 1; k <= n; k++) {

@@ -1,5 +1,4 @@
-//! Ctrl-C, SIGTERM and SIGHUP: the first asks the verb to stop and keep what it has, the second ends the program at
-//! once.
+//! Ctrl-C, SIGTERM and SIGHUP: the first asks the verb to stop and keep what it has, the second ends the program at once.
 
 use anyhow::Context;
 use sapwise_lab::progress::Interrupted;
@@ -13,8 +12,8 @@ static SIGNAL: AtomicU8 = AtomicU8::new(0);
 
 /// From now on signals set a flag instead of ending the program. For verbs that poll [`requested`].
 ///
-/// A signal that the program was started to ignore is ignored: `nohup` does so with SIGHUP, shells with the SIGINT of
-/// what runs in the background.
+/// A signal that the program was started to ignore is ignored: `nohup` does so with SIGHUP, shells with the SIGINT of what runs in the
+/// background.
 ///
 /// # Errors
 /// When the system refuses the handler.
@@ -41,8 +40,7 @@ pub(crate) fn requested() -> bool {
     REQUESTED.load(SeqCst)
 }
 
-/// The exit status of a program that has stopped because a signal asked it to, as shells report one that was ended by
-/// it.
+/// The exit status of a program that has stopped because a signal asked it to, as shells report one that was ended by it.
 pub(crate) fn exit_status() -> Option<u8> {
     let signal = SIGNAL.load(SeqCst);
     (signal > 0).then_some(128 + signal)

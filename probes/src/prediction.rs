@@ -145,8 +145,8 @@ fn unknown(algorithms: &Algorithms, registry: &Registry, model: &Model) -> Vec<S
         let id = format!("{method}@cpu1").parse();
         if id.is_ok_and(|id| model.method(&id).is_none()) {
             warnings.push(format!(
-                "{method} is not predicted: the model {} was trained on reports without it. Measure it with this program: \
-                 `probe --out own.json`, `train own.json --out own-model.json`, then `predict --model own-model.json`",
+                "{method} is not predicted: the model {} was trained on reports without it. Measure it with this \
+                 program: `probe --out own.json`, `train own.json --out own-model.json`, then `predict --model own-model.json`",
                 model.name
             ));
         }

@@ -15,8 +15,8 @@ const DELAY: Duration = Duration::from_secs(1);
 /// The bar is drawn again this often while no step is done, so that the seconds go on.
 const TICK: Duration = Duration::from_secs(1);
 
-/// What is shown on a terminal of at least so many columns: a line that wraps could not be drawn over. The time left
-/// follows from how fast the steps were done of late.
+/// What is shown on a terminal of at least so many columns: a line that wraps could not be drawn over. The time left follows from how fast the
+/// steps were done of late.
 const TEMPLATES: [(u16, &str); 3] = [
     (80, "{bar:32} {percent:>3} % {elapsed}{left}  {wide_msg}"),
     (40, "{percent:>3} % {elapsed}{left}  {wide_msg}"),
@@ -32,8 +32,7 @@ fn template(columns: u16) -> &'static str {
 
 /// A bar that shows itself after a second, and not at all when standard error is no terminal.
 ///
-/// Where steps take unlike times their number is no share of the work: give each as many as it takes milliseconds or
-/// bytes.
+/// Where steps take unlike times their number is no share of the work: give each as many as it takes milliseconds or bytes.
 pub(crate) struct Progress {
     bar: ProgressBar,
     /// Shows the bar after the delay, unless the sender is gone by then.
@@ -91,8 +90,8 @@ fn left(state: &ProgressState, out: &mut dyn Write) {
     let _ = written;
 }
 
-/// A thread that shows the bar after the delay: the thread that does the work may be waiting for a driver then. Without
-/// a thread there is no bar.
+/// A thread that shows the bar after the delay: the thread that does the work may be waiting for a driver then. Without a thread there is no
+/// bar.
 fn show_later(bar: ProgressBar) -> Option<(Sender<()>, JoinHandle<()>)> {
     let (alive, ended) = channel();
     let show = move || {

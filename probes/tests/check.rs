@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// A report of a machine that there is not, with one point.
+/// A report of an invented machine, with one point.
 fn report() -> Value {
     let samples = |ns: u64| json!([ns, ns + 1, ns + 2]);
     json!({
@@ -41,7 +41,7 @@ fn report() -> Value {
     })
 }
 
-/// Revision of the brute force in this build.
+/// The revision of brute force in this build.
 fn revision() -> u32 {
     let registry = sapwise::Registry::with_cores(1);
     registry.entries().iter().find(|e| e.id.method() == "brute").unwrap().revision
@@ -105,7 +105,7 @@ fn stale_and_inapplicable_files_fail_and_say_which_algorithm() {
     assert_eq!((&findings[0]["sound"], &findings[0]["current"]), (&true.into(), &false.into()));
     assert!(findings[0]["problems"].to_string().contains("brute has revision 999999"), "{findings:?}");
     assert_eq!(findings[1]["applicable"], false);
-    // A line for what wants more cores, however many algorithms that are.
+    // One line for all algorithms that want more cores.
     assert_eq!(findings[1]["problems"].as_array().map(Vec::len), Some(3), "{findings:?}");
     for text in ["brute@cpu4096, sap@cpu2048", "up to 4096 threads", "octree@cpu1", "grid-sap@gpu99"] {
         assert!(findings[1]["problems"].to_string().contains(text), "{findings:?}");
@@ -397,8 +397,8 @@ fn keys_of_a_newer_version_are_ignored_and_told_once_a_file() {
         point["load"]["depth"] = 3.into();
     }
     let newer = write(folder.path(), "newer.json", newer.to_string());
-    let sentence = "newer.json is of report/2.9, which a newer version of sapwise wrote; ignored, because this version does not know it: \
-                    points[].load.depth, weather";
+    let sentence = "newer.json is of report/2.9, which a newer version of sapwise wrote; ignored, because this version \
+                    does not know it: points[].load.depth, weather";
     let (status, findings) = check(std::slice::from_ref(&newer));
     assert!(status == 0 && findings[0]["notes"].to_string().contains(sentence), "{findings:?}");
     let out = folder.path().join("tuning.json");

@@ -1,4 +1,4 @@
-//! The command as other programs and people meet it: usage, exit statuses, the JSON of each verb.
+//! The command line: usage, exit statuses, and the verbs `devices`, `pairs` and `schema`.
 
 mod common;
 
@@ -150,7 +150,7 @@ fn an_unknown_algorithm_is_wrong_usage_and_names_the_known() {
         ("brute@cpu4096", "`sapwise devices` lists what can"),
     ] {
         let complaint = failure(sapwise().arg("pairs").arg(&boxes).args(["--algorithm", id]), 2);
-        // Nothing that only a program can do.
+        // No advice that only a program can follow.
         assert!(complaint.contains(told) && !complaint.contains("Registry"), "{complaint}");
     }
 }
@@ -159,7 +159,7 @@ fn an_unknown_algorithm_is_wrong_usage_and_names_the_known() {
 fn an_output_that_can_not_be_written_is_a_failure_that_names_it() {
     let folder = tempfile::tempdir().unwrap();
     let boxes = npy(folder.path(), "boxes.npy", "<f4", "1, 6", &[0.0; 6]);
-    // A folder below a file can't be made even by a superuser.
+    // Not even a superuser can create a folder below a file.
     let out = boxes.join("pairs.npy");
     let complaint = failure(sapwise().arg("pairs").arg(&boxes).arg("--out").arg(&out), 1);
     assert!(complaint.contains("pairs.npy"), "{complaint}");
@@ -220,7 +220,7 @@ fn help_that_nobody_gets_is_a_failure() {
     }
 }
 
-/// Before minutes of work, not behind them.
+/// Before minutes of work, not after them.
 #[test]
 fn a_file_that_cannot_be_written_is_told_first() {
     let folder = tempfile::tempdir().unwrap();
@@ -244,7 +244,7 @@ fn a_second_signal_ends_it_as_if_it_were_not_caught() {
     use std::io::{BufRead, BufReader};
     use std::os::unix::process::ExitStatusExt;
     let folder = tempfile::tempdir().unwrap();
-    // A frame of them takes seconds, and within it no verb looks whether it is to stop.
+    // A frame of these boxes takes seconds, and no verb looks for a signal within a frame.
     let apart: Vec<f32> =
         (0..300_000).flat_map(|k| [k as f32 * 2.0, 0.0, 0.0, k as f32 * 2.0 + 1.0, 1.0, 1.0]).collect();
     let boxes = npy(folder.path(), "apart.npy", "<f4", "300000, 6", &apart);
@@ -264,7 +264,7 @@ fn a_second_signal_ends_it_as_if_it_were_not_caught() {
             assert_eq!(pairs.wait().unwrap().signal(), Some(15));
             return;
         }
-        // It did not listen yet, and ended at once: it is tried again, later.
+        // It ended at once, since it did not listen yet: try again with a longer wait.
         pairs.wait().unwrap();
         assert!(wait.as_secs() < 60, "it never listens: {told}");
         wait *= 2;

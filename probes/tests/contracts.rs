@@ -1,4 +1,4 @@
-//! The JSON that other programs read, of the verbs that lead from a report to a simulation.
+//! The JSON of `train`, `predict` and `run`, which other programs read.
 
 mod common;
 
@@ -37,7 +37,7 @@ fn assert_tuning(tuning: &Value, source: &str) {
     let crossovers = tuning["crossovers"].as_array().unwrap();
     for crossover in crossovers {
         assert_keys(crossover, &["below", "above", "objects"]);
-        // Claimed where two machines or more were held out of the training and this one is like them.
+        // An interval is claimed if the training held out two machines or more and this one is like them.
         let extrapolated = tuning["extrapolated"] == true;
         let claimed =
             crossover["low"].is_null() == crossover["high"].is_null() && (!extrapolated || crossover["low"].is_null());
@@ -79,7 +79,7 @@ fn train_and_predict_keep_their_contracts() {
 }
 
 #[test]
-fn measured_tuning_come_from_the_report_alone() {
+fn a_measured_tuning_comes_from_the_report_alone() {
     let folder = tempfile::tempdir().unwrap();
     let own = report(folder.path(), "own.json", &[]);
     let measured = |words: &[&str]| {
@@ -146,7 +146,7 @@ fn run_keeps_its_contract() {
 }
 
 #[test]
-fn run_refuses_tuning_and_reports_of_other_revisions() {
+fn run_refuses_tunings_and_reports_of_other_revisions() {
     let folder = tempfile::tempdir().unwrap();
     let old = report(folder.path(), "old.json", &[("/algorithms/0/revision", 999_999.into())]);
     let own = report(folder.path(), "own.json", &[]);
@@ -167,7 +167,7 @@ fn the_card_of_the_built_in_model_is_the_one_that_training_writes() {
     let stored = sapwise_lab::StoredModel::built_in().unwrap();
     let written = sapwise_lab::model_card::page(&stored.model, &stored.training, &[]);
     let card = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../models/README.md")).unwrap();
-    // The notes of a training stand in its card and not in the model.
+    // The card holds the notes of a training, the model does not.
     let (page, _notes) = card.split_once("\n## Notes\n").unwrap();
     let differs = page.lines().zip(written.lines()).find(|(card, written)| card != written);
     assert!(page == written, "models/README.md differs: {differs:?}");

@@ -7,7 +7,7 @@ use sapwise_lab::report::Label;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What a node is asked to measure.
+/// The probe of a node.
 const TINY: [&str; 7] = ["probe", "--no-gpus", "--quick", "--scenario", "uniform", "--max-objects", "10"];
 
 fn probe(node: &str, folder: &Path) -> assert_cmd::Command {

@@ -1,4 +1,4 @@
-//! What a person at a terminal sees, and what a pipe gets instead.
+//! What a terminal shows, and what a pipe gets.
 
 mod common;
 
@@ -7,8 +7,8 @@ use std::fs;
 #[cfg(target_os = "linux")]
 use std::process::Command;
 
-/// What the prediction for a report shows on a terminal of that many columns. `None`, with a line that says so, where
-/// the program is missing that makes a terminal.
+/// Returns what the prediction for a report shows on a terminal of a width. `None`, with a line that says so, without the
+/// program `script`, which makes a terminal.
 #[cfg(target_os = "linux")]
 fn on_a_terminal(columns: u32, variables: &[(&str, &str)]) -> Option<String> {
     let quoted = |text: &str| format!("'{text}'");

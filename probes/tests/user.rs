@@ -1,9 +1,8 @@
-//! A user's program with an algorithm of its own: the example `own_algorithm` from the probe to the run, beside the
-//! plain command.
+//! A user's program with its own algorithm: the example `own_algorithm` from `probe` to `run`, compared with the plain
+//! command.
 //!
-//! This program has a `main` of its own (`harness = false`): verbs start parts of a measurement as processes of the
-//! program that they are in, and one made by the usual harness would run tests there. Started with [`AS_COMMAND`] it is
-//! the example.
+//! This program has its own `main` (`harness = false`): verbs start parts of a measurement as processes of their own
+//! program, and the usual harness would run tests there. Started with [`AS_COMMAND`] it is the example.
 
 mod common;
 #[path = "../examples/own_algorithm.rs"]
@@ -18,7 +17,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::{env, fs};
 
-/// The variable that makes this program the example. Its parts inherit it.
+/// The variable that makes this program the example. Its child processes inherit it.
 const AS_COMMAND: &str = "SAPWISE_TEST_AS_COMMAND";
 
 /// Every test by its name.
@@ -37,11 +36,10 @@ fn main() -> ExitCode {
         Ok("threads") => return on_threads(),
         _ => {}
     }
-    // Cargo puts the name that it was given first. Behind it are words for the usual harness, which say nothing here.
+    // The first argument is the filter of `cargo test`. Those after it are for the usual harness.
     let wanted = env::args().nth(1).filter(|word| !word.starts_with('-')).unwrap_or_default();
     for (name, test) in TESTS {
         if name.contains(&wanted) {
-            // A test that fails panics, which ends the program with a status above 0.
             test();
             println!("test {name} ... ok");
         }
@@ -49,7 +47,7 @@ fn main() -> ExitCode {
     ExitCode::SUCCESS
 }
 
-/// A program whose algorithm has the name of one of ours.
+/// A program whose algorithm has a name of the library's.
 fn clash() -> ExitCode {
     sapwise_cli::Command::new()
         .with(UserAlgorithm::on_one_thread("grid-sap", 1, || unreachable!("it was refused")))
@@ -89,11 +87,10 @@ fn names(list: &Value) -> Vec<&str> {
     list.as_array().unwrap().iter().map(|entry| entry.as_str().unwrap()).collect()
 }
 
-/// The report of a small probe. The label of an optimised build is put on it, and that of an undisturbed machine, which
-/// one that runs tests is not.
+/// The report of a small probe, changed to that of an optimised build on an undisturbed machine.
 fn probed(folder: &Path) -> PathBuf {
     let path = folder.join("report.json");
-    let words = ["probe", "--no-gpus", "--scenario", "uniform", "--max-objects", "1000", "--out"];
+    let words = ["probe", "--no-gpus", "--quick", "--scenario", "uniform", "--max-objects", "1000", "--out"];
     success(user().args(words).arg(&path));
     let mut report = read(&path);
     report["provenance"]["optimised"] = true.into();
@@ -124,7 +121,7 @@ fn from_the_probe_to_the_run_as_one_of_ours() {
     let points = told["points"].as_array().unwrap();
     let timings = points.iter().flat_map(|p| p["timings"].as_array().unwrap());
     let own: Vec<&Value> = timings.filter(|t| t["algorithm"] == "sweep@cpu1").collect();
-    assert!(own.len() >= 8 && own.iter().all(|t| t["error"].is_null()), "{own:?}");
+    assert!(own.len() >= 6 && own.iter().all(|t| t["error"].is_null()), "{own:?}");
 
     let model = file("model.json");
     success(user().arg("train").arg(&report).arg("--out").arg(&model));
@@ -132,7 +129,7 @@ fn from_the_probe_to_the_run_as_one_of_ours() {
     let of_user =
         fitted["methods"].as_array().unwrap().iter().find(|m| m["method"] == "sweep").expect("a cost of sweep");
     assert_eq!((&of_user["revision"], &of_user["backend"]), (&1.into(), &"cpu".into()));
-    // Of a sweep as short as this the fit may find no share of some; others than the user's are never fitted.
+    // A sweep as short as this may not show every term of the user; no other term is ever fitted.
     let named = |fitted: &Value| timed["terms"].as_array().unwrap().iter().any(|t| t["term"] == fitted["term"]);
     let terms = of_user["terms"].as_array().unwrap();
     assert!(!terms.is_empty() && terms.iter().all(named), "{terms:?}");
@@ -142,7 +139,7 @@ fn from_the_probe_to_the_run_as_one_of_ours() {
         let words = ["predict", "--json", "--report"];
         success(command.args(words).arg(&report).arg("--model").arg(&model).arg("--out").arg(&tuning))
     };
-    // The plain command predicts ours, and says what it can't choose.
+    // The plain command predicts the library's algorithms, and says what it can't choose.
     let plain: Value = serde_json::from_str(&predict(sapwise())).unwrap();
     assert!(!plain["costs"].to_string().contains("sweep"), "{plain}");
     let warned = names(&plain["warnings"]).iter().any(|w| w.contains("knows sweep, which is not in this build"));
@@ -150,7 +147,7 @@ fn from_the_probe_to_the_run_as_one_of_ours() {
     let own: Value = serde_json::from_str(&predict(user())).unwrap();
     assert!(own["costs"].as_array().unwrap().iter().any(|c| c["algorithm"] == "sweep@cpu1"), "{own}");
     assert!(!own["warnings"].to_string().contains("sweep"), "{}", own["warnings"]);
-    // The built-in model does not know it, and says what to do.
+    // The built-in model does not know it.
     let built_in = success(user().args(["predict", "--json", "--report"]).arg(&report));
     assert!(built_in.contains("sweep is not predicted") && built_in.contains("own-model.json"), "{built_in}");
 
@@ -180,8 +177,7 @@ fn check_names_a_number_of_threads_that_it_can_not_be_made_on(tuning: &Path) {
 fn the_pairs_are_those_of_ours() {
     let folder = tempfile::tempdir().unwrap();
     let inf = f32::INFINITY;
-    // Touching boxes in a row, one without a volume, one without an end, two far out that lie beyond each other, two
-    // that meet there.
+    // Touching boxes in a row, a point, an infinite one, two far out that lie apart, two that meet there.
     let mut boxes: Vec<[f32; 6]> = (0..9).map(|k| k as f32).map(|x| [x, 0.0, 0.0, x + 1.0, 1.0, 1.0]).collect();
     boxes.extend([[3.0; 6], [-inf, -inf, -inf, inf, inf, inf], [-inf, 0.0, 0.0, 4.5, inf, inf]]);
     boxes.extend([[1e30, 0.0, 0.0, 2e30, 1.0, 1.0], [3e30, 0.0, 0.0, 4e30, 1.0, 1.0], [4e30, 1.0, 0.0, inf, 1.0, 1.0]]);

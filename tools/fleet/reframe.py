@@ -4,8 +4,8 @@
     sapwise check /shared/reports
 
 `--distribute=idle` makes one job for each idle node; without it, as with ReFrame's own generic system, the test runs on
-this machine. `-S reports=FOLDER` names the shared folder, which the test creates if it is missing; `-S sapwise=PATH` the
-command if it is not on the PATH; `-S options=--quick,--no-gpus` further options of `sapwise probe`. A node whose report
+this machine. `-S reports=FOLDER` names the shared folder, which the test creates if it is missing; `-S sapwise=PATH`
+the command if it is not on the PATH; `-S options=--quick,--no-gpus` further options of `sapwise probe`. A node whose report
 is complete is not measured again.
 
 ReFrame keeps hardware parameters of each run, which compares a node with itself a month ago; `sapwise check` compares

@@ -22,4 +22,4 @@ srun --ntasks-per-node=1 --kill-on-bad-exit=0 \
 there=$(find "$folder" -maxdepth 1 -name '*.json' | wc -l)
 [ "$there" = 0 ] || "$sapwise" check "$folder"
 [ "$there" -ge "$SLURM_JOB_NUM_NODES" ] \
-    || { echo "$there of $SLURM_JOB_NUM_NODES nodes left a report; submit the job again, which measures the others"; exit 1; }
+    || { echo "$there of $SLURM_JOB_NUM_NODES nodes left a report; submit the job again for the others"; exit 1; }

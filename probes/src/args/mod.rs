@@ -68,7 +68,7 @@ Examples:
   sapwise predict --scenario clustered --out tuning.json
   sapwise predict --report other-machine.json --model mine.json
   sapwise predict --report this-machine.json --measured --out tuning.json    # measured, for an engine to ship
-  sapwise predict --report reports --measured --out tunings                  # one for each kind of machine in a folder")]
+  sapwise predict --report reports --measured --out tunings                  # one for each kind of machine")]
 pub(crate) struct Predict {
     /// Predict for the machine of this report, or for each kind of machine in a folder of reports [default: this
     /// machine].
@@ -140,7 +140,10 @@ pub(crate) struct Pairs {
     #[arg(long, value_name = "ID", default_value = "grid-sap@cpu1")]
     pub(crate) algorithm: AlgorithmId,
     /// How often all frames are run, 1 to 1 000 000.
-    #[arg(long, value_name = "K", default_value_t = 1, value_parser = known::whole(1..=1_000_000), allow_negative_numbers = true)]
+    #[arg(
+        long, value_name = "K", default_value_t = 1, value_parser = known::whole(1..=1_000_000),
+        allow_negative_numbers = true
+    )]
     pub(crate) repeat: u32,
     /// Where the pairs of the last frame go: sorted 32-bit unsigned integers of shape m × 2.
     #[arg(long, value_name = "PAIRS.npy")]

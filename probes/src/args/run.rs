@@ -8,13 +8,11 @@ use sapwise_scenes::Scenario;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// Runs a scenario, or a recorded stream of boxes, with the adaptive choice and with each algorithm alone, and compares
-/// their times.
+/// Runs a scenario, or a recorded stream of boxes, with the adaptive choice and with every fixed algorithm, and compares their times.
 ///
-/// All of them run the same frames in turn, so that a machine that slows down slows all of them, with other work
-/// between two turns, as in a program. Each repeat starts from scratch. Times are medians over the repeats. The oracle
-/// runs the best algorithm of every frame, chosen on one half of the repeats and timed on the other: a minimum of noisy
-/// times would be less than any algorithm takes.
+/// All of them run on the same frames in turn, so that a machine that slows down slows all of them, and start every repeat without what
+/// they kept. Between two turns other work is done, as a program does between two frames. Times are medians over the repeats. They are compared with an oracle that runs the best algorithm of every frame, chosen on
+/// one half of the repeats and timed on the other: the minimum of many noisy times would be less than any algorithm takes.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -24,58 +22,58 @@ Examples:
   sapwise run clustered --swing 50 --frames 600                    # the number of objects grows and shrinks
   sapwise run uniform --frames 900 --co-runner 450 --trace run.csv
   sapwise run clustered --objects 50000 --frames 100 --record clustered.npy --json
-  sapwise run clustered.npy --no-learning                          # the pure prediction, on a recorded stream")]
+  sapwise run clustered.npy --no-learning              # the pure prediction, on a recorded stream")]
 pub(crate) struct Run {
-    /// The scenario; or your own frames: an .npy file of 32-bit floats of shape frames × n × 6, each row a box: min x y
-    /// z, max x y z. Rows of NaN at the end of a frame are absent boxes.
+    /// The scenario; or a stream of your own frames: an .npy file of 32-bit floats of shape frames x n x 6, each row a box: min x y z, max x
+    /// y z. Rows of NaN at the end of a frame are absent boxes.
     #[arg(value_name = "SCENARIO|BOXES.npy", value_parser = known::scenario_or(|text: &str| text.parse::<Scene>()))]
     pub(crate) scene: Scene,
-    /// A tuning, or a report to compute one from [default: predicted from this machine's hardware]. The tuning of
-    /// another machine shows how learning corrects it.
+    /// A tuning file, or a report to compute a tuning from. The tuning of another machine shows how learning corrects it. Without this option
+    /// the tuning is predicted from this machine's hardware.
     #[arg(long, value_name = "T.json")]
     pub(crate) tuning: Option<PathBuf>,
-    /// Do not correct the expected costs with the times of the frames.
+    /// Do not correct the expected costs by the times of the frames.
     #[arg(long)]
     pub(crate) no_learning: bool,
-    /// Never run an algorithm only to learn its cost.
+    /// Never run another algorithm than the cheapest to learn what it costs.
     #[arg(long)]
     pub(crate) no_exploring: bool,
-    /// Number of objects, in fragmentation the largest, 1 to 10 000 000 [default: 20000]. Not for a stream.
+    /// Objects; in fragmentation the largest number of them. Without this option 20 000. A stream has its own.
     #[arg(long, value_name = "N", value_parser = known::whole(1..=10_000_000), allow_negative_numbers = true)]
     pub(crate) objects: Option<u32>,
-    /// Let the number of objects grow from this one up to --objects and back, 1 to 10 000 000 [default: constant].
+    /// Let the number of objects grow from this one up to --objects and back over the frames.
     #[arg(long, value_name = "LEAST", value_parser = known::whole(1..=10_000_000), allow_negative_numbers = true)]
     pub(crate) swing: Option<u32>,
-    /// Number of frames, 1 to 1 000 000 [default: 200; 600 in fragmentation; all of a stream].
+    /// Frames. Without this option 200, in fragmentation one cycle of 600, of a stream all.
     #[arg(long, value_name = "F", value_parser = known::whole(1..=1_000_000), allow_negative_numbers = true)]
     pub(crate) frames: Option<u32>,
-    /// How often all frames are run, 1 to 1000. With 1 the oracle takes the least time of every frame.
+    /// How often the whole simulation is run. With one, the oracle has the least time of every frame.
     #[arg(long, value_name = "R", default_value_t = 6, value_parser = known::whole(1..=1000), allow_negative_numbers = true)]
     pub(crate) repeats: u32,
     /// Seed of the scene and of the order in which algorithms run.
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
-    /// Frames at which the table of results is divided, with commas between [default: 300, the frames that learning may
-    /// take, and the frame of the co-runner].
+    /// Show the figures before this frame and from it on apart; several with commas between. Without this option 300, the frames that
+    /// learning may take, and the frame of the co-runner.
     #[arg(long, value_name = "FRAME", value_delimiter = ',')]
     pub(crate) after: Vec<usize>,
-    /// From this frame on, run threads that take three eighths of the CPU: THREADS of them [default: one a core].
-    /// Everything then takes about 1.6 times as long; the slowdown is printed.
+    /// From this frame on run threads, one for each core or THREADS, that take three eighths of the CPU, so that everything takes about 1.6
+    /// times as long. The slowdown that was reached is printed.
     #[arg(long, value_name = "FRAME[:THREADS]")]
     pub(crate) co_runner: Option<CoRunner>,
     #[command(flatten)]
     pub(crate) gpus: GpuChoice,
-    /// Where the frames go, as a stream that `run` and `pairs` read.
+    /// Write the frames as a stream before they are run. `run` and `pairs` read it.
     #[arg(long, value_name = "S.npy")]
     pub(crate) record: Option<PathBuf>,
-    /// Where a table goes, with one row a frame: load, decision, expected and measured times, the time of every
-    /// algorithm. The name ends in .csv.
+    /// Where a table goes with one row per frame: load, decision, expected and measured times, the time of every algorithm. A file that ends
+    /// in .csv.
     #[arg(long, value_name = "T.csv")]
     pub(crate) trace: Option<PathBuf>,
     /// Where an SVG goes: the time of each frame by the adaptive choice and by every algorithm, and which one was chosen.
     #[arg(long, value_name = "P.svg")]
     pub(crate) plot: Option<PathBuf>,
-    /// Print one JSON object instead of a table.
+    /// One JSON object on standard output instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -94,7 +92,7 @@ impl FromStr for Scene {
         let path = Path::new(text);
         match text.parse() {
             Ok(scenario) => Ok(Self::Scenario(scenario)),
-            // The code that reads it reports a missing file or another format.
+            // A file that is missing or of another format is reported by the code that reads it.
             Err(_) if path.extension().is_some_and(|e| e == "npy") || path.exists() => {
                 Ok(Self::Stream(path.to_owned()))
             }

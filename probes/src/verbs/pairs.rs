@@ -85,7 +85,8 @@ fn memory_limit(threads: u32) -> usize {
 fn refused(id: &AlgorithmId, error: &sapwise::Error) -> WrongUsage {
     match error {
         sapwise::Error::Unavailable { reason: Unavailable::TooFewCores { threads, most }, .. } => WrongUsage(format!(
-            "{id} can't run here: it has {threads} threads, and this process may use {}; `sapwise devices` lists what can",
+            "{id} can't run here: it has {threads} threads, and this process may use {}; `sapwise devices` lists what \
+             can",
             count(*most as usize, "core")
         )),
         _ => WrongUsage(error.to_string()),

@@ -19,8 +19,8 @@ use std::path::Path;
 
 pub(super) fn run(folder: &Path, arguments: &Predict, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
     let Some(out) = arguments.out.as_deref().filter(|_| !arguments.json) else {
-        let why = "the reports of a folder may be of several kinds of machines: name a folder for their tunings with --out, \
-                   without --json";
+        let why = "the reports of a folder may be of several kinds of machines: name a folder for their tunings with \
+                   --out, without --json";
         return Err(WrongUsage(why.to_owned()).into());
     };
     if out.canonicalize().is_ok_and(|out| folder.canonicalize().is_ok_and(|folder| folder == out)) {

@@ -36,13 +36,13 @@ pub(crate) fn small_report(machine: &str) -> Value {
     report
 }
 
-/// The command where no Vulkan driver is found. On other interfaces the adapters of the machine stay.
+/// The command without Vulkan drivers. Adapters of other interfaces stay.
 pub(crate) fn without_adapters(command: &mut Command) -> &mut Command {
     command.env("VK_ICD_FILENAMES", "/nonexistent").env("VK_DRIVER_FILES", "/nonexistent")
 }
 
-/// The answer of `sapwise devices --json` on a machine with an adapter. `None`, with a line that says so, without any;
-/// a failure then where the environment says `SAPWISE_REQUIRE_GPU=1`.
+/// The answer of `sapwise devices --json` on a machine with an adapter. Without any: `None`, with a line that says so, or a
+/// failure with `SAPWISE_REQUIRE_GPU=1`.
 pub(crate) fn devices_with_a_gpu(test: &str) -> Option<serde_json::Value> {
     let answer: serde_json::Value = serde_json::from_str(&success(sapwise().args(["devices", "--json"]))).unwrap();
     if answer["adapters"].as_array().unwrap().is_empty() {
@@ -54,15 +54,14 @@ pub(crate) fn devices_with_a_gpu(test: &str) -> Option<serde_json::Value> {
     Some(answer)
 }
 
-/// Sends a signal to a running command. Not SIGINT, which shells let what runs in the background ignore, these tests
-/// among it.
+/// Sends a signal to a running command. Not SIGINT: a command that a shell starts in the background ignores it.
 #[cfg(unix)]
 pub(crate) fn send(signal: &str, to: &std::process::Child) {
     let sent = std::process::Command::new("kill").args([signal, &to.id().to_string()]).status().unwrap();
     assert!(sent.success());
 }
 
-/// Exit status of a command that SIGTERM asked to stop.
+/// Exit status of a command that SIGTERM stopped.
 pub(crate) const TERMINATED: i32 = 128 + 15;
 
 /// Runs to exit status 0 and returns standard output.
@@ -83,7 +82,7 @@ pub(crate) fn failure(command: &mut Command, status: i32) -> String {
     complaint
 }
 
-/// Writes a file in NumPy's format 1.0. `dtype` and `shape` stand as they are in the header; the data is little-endian.
+/// Writes a file in NumPy's format 1.0, with `dtype` and `shape` as given and little-endian data.
 pub(crate) fn npy(folder: &Path, name: &str, dtype: &str, shape: &str, data: &[f32]) -> PathBuf {
     let mut header = format!("{{'descr': '{dtype}', 'fortran_order': False, 'shape': ({shape}), }}");
     while (10 + header.len() + 1) % 64 != 0 {
