@@ -123,25 +123,25 @@ impl PairedRatio {
         if !(first.ln_objects..=last.ln_objects).contains(&at) {
             return None;
         }
-        // Where the ratio becomes distinct on the way from a size to one at which it is.
-        let edge = |within: &Size, beyond: &Size| {
-            let (from, to) = (within.told(NORMAL_90), beyond.told(NORMAL_90));
-            let share = (to.signum() - from) / (to - from);
-            between(within.ln_objects, beyond.ln_objects, share.clamp(0.0, 1.0))
+        let told: Vec<f64> = self.sizes.iter().map(|size| size.told(NORMAL_90)).collect();
+        // Where the ratio becomes distinct on the way from one size to the next, which is distinct.
+        let edge = |within: usize, beyond: usize| {
+            let (from, to) = (told[within].clamp(-1.0, 1.0), told[beyond].signum());
+            let share = if from == to { 0.0 } else { (to - from) / (told[beyond] - from) };
+            between(self.sizes[within].ln_objects, self.sizes[beyond].ln_objects, share).exp()
         };
-        let end = |k: usize| &self.sizes[k];
-        let low = match (0..self.sizes.len()).rev().find(|&k| end(k).ln_objects <= at && end(k).told(NORMAL_90) <= -1.0)
-        {
-            Some(k) if k + 1 < self.sizes.len() => edge(end(k + 1), end(k)).min(at),
-            Some(_) => at,
-            None => first.ln_objects,
+        let sizes = || (0..told.len()).map(|k| (k, self.sizes[k].ln_objects));
+        let low = match sizes().rev().find(|&(k, ln)| ln <= at && told[k] <= -1.0) {
+            Some((k, _)) if k + 1 < told.len() => edge(k + 1, k),
+            Some(_) => objects,
+            None => first.ln_objects.exp(),
         };
-        let high = match (0..self.sizes.len()).find(|&k| end(k).ln_objects >= at && end(k).told(NORMAL_90) >= 1.0) {
-            Some(k) if k > 0 => edge(end(k - 1), end(k)).max(at),
-            Some(_) => at,
-            None => last.ln_objects,
+        let high = match sizes().find(|&(k, ln)| ln >= at && told[k] >= 1.0) {
+            Some((k, _)) if k > 0 => edge(k - 1, k),
+            Some(_) => objects,
+            None => last.ln_objects.exp(),
         };
-        Some((low.exp(), high.exp()))
+        Some((low.min(objects), high.max(objects)))
     }
 }
 
