@@ -1,7 +1,7 @@
 //! What each region holds, finds and sends.
 
 use sapwise::{Aabb, Load};
-use sapwise_ranks::{BOX_BYTES, Cuts, PAIR_BYTES, TOLD_BYTES, centre};
+use sapwise_ranks::{BOX_BYTES, Cuts, PAIR_BYTES, COUNT_BYTES, centre};
 
 /// Counts for each rank.
 pub(super) struct Census {
@@ -75,7 +75,7 @@ impl Census {
 
     /// Bytes that each rank sends in a frame.
     pub(super) fn bytes(&self, ranks: usize) -> Vec<u64> {
-        let told = TOLD_BYTES * (ranks as u64 - 1);
+        let told = COUNT_BYTES * (ranks as u64 - 1);
         let of = |(sent, returned): (&u64, &u64)| told + BOX_BYTES * sent + PAIR_BYTES * returned;
         self.sent.iter().zip(&self.returned).map(of).collect()
     }
