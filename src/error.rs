@@ -134,6 +134,15 @@ impl From<String> for Unavailable {
     }
 }
 
+impl fmt::Display for BoxDefect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NotANumber => "has a bound that is not a number (NaN)",
+            Self::Inverted => "is inverted: a minimum is above its maximum",
+        })
+    }
+}
+
 impl fmt::Display for Unavailable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -169,11 +178,7 @@ impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Error::InvalidBox { index, defect } => {
-                let what = match defect {
-                    BoxDefect::NotANumber => "has a bound that is not a number (NaN)",
-                    BoxDefect::Inverted => "is inverted: a minimum is above its maximum",
-                };
-                write!(f, "box {index} {what}; correct it or leave it out")
+                write!(f, "box {index} {defect}; correct it or leave it out")
             }
             Error::TooManyObjects { objects } => {
                 write!(

@@ -22,18 +22,6 @@ pub struct Crossover {
 }
 
 impl Crossover {
-    /// A crossover without an interval.
-    #[must_use]
-    pub fn new(below: AlgorithmId, above: AlgorithmId, objects: f64) -> Self {
-        Self { below, above, objects, low: None, high: None }
-    }
-
-    /// The same with an interval that contains `objects`.
-    #[must_use]
-    pub fn with_interval(self, low: f64, high: f64) -> Self {
-        Self { low: Some(low), high: Some(high), ..self }
-    }
-
     /// Both ends of the interval, if there is one.
     #[must_use]
     pub fn interval(&self) -> Option<(f64, f64)> {

@@ -2,7 +2,7 @@
 //!
 //! Algorithms of a method share their [`Work`], and all residuals share their [`Places`]. A file holds each once.
 
-use super::{AlgorithmCost, Crossover, Observation, Source, Step, Tuning, TuningError};
+use super::{AlgorithmCost, Crossover, Source, Step, Tuning, TuningError};
 use crate::cost::{CostTerm, Fallback, Helpers, Places, Residual};
 use crate::{AlgorithmId, CostCurve, Load, Work};
 use std::sync::Arc;
@@ -35,9 +35,6 @@ pub(super) struct TuningFile {
     works: Vec<WorkFile>,
     /// The cost of each algorithm. Empty: `steps` decide.
     costs: Vec<CostFile>,
-    /// The samples by which a prediction was corrected before the first frame.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    samples: Vec<Observation>,
 }
 
 /// The cost of a method on one thread, or on some GPUs.
@@ -156,7 +153,6 @@ impl From<Tuning> for TuningFile {
             places,
             works: works.files,
             costs,
-            samples: tuning.samples,
         }
     }
 }
@@ -198,7 +194,6 @@ impl TryFrom<TuningFile> for Tuning {
             crossovers: file.crossovers,
             interval_basis: file.interval_basis,
             costs: file.costs.into_iter().map(cost).collect::<Result<_, _>>()?,
-            samples: file.samples,
         };
         tuning.defect().map_or(Ok(tuning), Err)
     }

@@ -36,7 +36,7 @@ mod exchange;
 mod wait;
 
 pub use exchange::MpiExchange;
-pub use sapwise_ranks::{Balance, Cuts, Error, Failure, FrameReport, RankPairs, Region};
+pub use sapwise_ranks::{Cuts, Error, Failure, FrameReport, RankPairs, Region};
 
 /// A broad phase over the ranks of a communicator: `Distributed::new(&communicator, &registry, tuning)` on all of its
 /// ranks.

@@ -22,12 +22,7 @@ pub(crate) fn failed(py: Python<'_>, text: impl Into<String>) -> PyErr {
 
 /// Makes the exception for an invalid box.
 pub(crate) fn invalid_box(py: Python<'_>, which: &str, index: usize, defect: BoxDefect) -> PyErr {
-    let what = match defect {
-        BoxDefect::NotANumber => "has a bound that is not a number (NaN)",
-        BoxDefect::Inverted => "is inverted: a minimum is above its maximum",
-        _ => "is invalid",
-    };
-    instance(py, "InvalidBoxError", (format!("box {index}{which} {what}; correct or leave out this box"), index))
+    instance(py, "InvalidBoxError", (format!("box {index}{which} {defect}; correct it or leave it out"), index))
 }
 
 /// Makes the exception for an error of a frame of the boxes `which`.

@@ -1,12 +1,11 @@
-//! The JSON Schemas of files.
+//! The JSON Schemas of all files.
 
 use crate::report::{self, Report};
 use crate::training::Training;
 use sapwise::json::{self, Error};
 use serde_json::Value;
 
-/// File names and texts of the JSON Schemas of tuning, models and reports. That of models holds what training says of
-/// itself too.
+/// Returns file names and texts of the JSON Schemas of tunings, models and reports.
 ///
 /// # Errors
 /// When a schema can't be written.
@@ -19,7 +18,7 @@ pub fn schemas() -> Result<Vec<(String, String)>, Error> {
     Ok(schemas)
 }
 
-/// The schema of the engine's part of a model, with that of the training in its place.
+/// Puts the schema of the notes of a training into that of the predicting part of a model.
 fn with_training(model: &str) -> Result<String, Error> {
     let mut model: Value = serde_json::from_str(model).map_err(Error::Write)?;
     let mut training = schemars::schema_for!(Training).to_value();
@@ -38,7 +37,7 @@ mod tests {
     use std::path::Path;
 
     #[test]
-    fn the_committed_schemas_are_those_of_the_types() {
+    fn committed_schemas_are_those_of_the_types() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../schemas");
         for (name, text) in super::schemas().unwrap() {
             let committed = std::fs::read_to_string(folder.join(&name)).unwrap_or_default();

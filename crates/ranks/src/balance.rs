@@ -13,7 +13,7 @@ const MOST_PATIENCE: f64 = 64.0;
 /// space is cut again. This loses at most twice the best choice, as in the ski-rental problem (Karp, 1992). Cuts that
 /// did not help raise the price of the next ones.
 #[derive(Debug, Clone)]
-pub struct Balance {
+pub(crate) struct Balance {
     /// Time lost since the last cuts.
     owed_ns: f64,
     /// The multiple of the price that must be lost before the next cuts.
@@ -36,14 +36,12 @@ impl Default for Balance {
 
 impl Balance {
     /// Whether to cut before the next frame.
-    #[must_use]
-    pub fn is_due(&self) -> bool {
+    pub(crate) fn is_due(&self) -> bool {
         self.due
     }
 
     /// The time of the slowest rank over that of equally busy ranks, minus one; `None` while times are unknown.
-    #[must_use]
-    pub fn imbalance(&self) -> Option<f64> {
+    pub(crate) fn imbalance(&self) -> Option<f64> {
         self.imbalance
     }
 
@@ -53,13 +51,13 @@ impl Balance {
     }
 
     /// Notes that space was cut. The next frame counts the boxes.
-    pub fn cut(&mut self) {
+    pub(crate) fn cut(&mut self) {
         self.was = self.imbalance.take();
         (self.owed_ns, self.cut_at, self.due) = (0.0, None, false);
     }
 
     /// Takes the records of all ranks in a frame.
-    pub fn observe(&mut self, records: &[RankRecord]) {
+    pub(crate) fn observe(&mut self, records: &[RankRecord]) {
         let boxes: u64 = records.iter().map(|r| r.boxes).sum();
         let before = *self.cut_at.get_or_insert(boxes);
         // Else the scene has begun or mostly gone since the cuts.

@@ -24,7 +24,7 @@ pub const BOX_BYTES: u64 = 8 * BOX_WORDS as u64;
 /// Bytes of a pair that is sent.
 pub const PAIR_BYTES: u64 = 8 * PAIR_WORDS as u64;
 /// Bytes of counts that each rank sends to each other one in a frame.
-pub const TOLD_BYTES: u64 = 8 * (record::WORDS + ANSWER_WORDS) as u64;
+pub const COUNT_BYTES: u64 = 8 * (record::WORDS + ANSWER_WORDS) as u64;
 
 /// Finds the pairs of boxes that are spread over ranks.
 ///
@@ -44,8 +44,8 @@ pub struct Distributed<E> {
     records: Vec<RankRecord>,
     boxes_out: Outbox<BOX_WORDS>,
     pairs_out: Outbox<PAIR_WORDS>,
-    told: Vec<u64>,
-    heard: Vec<u64>,
+    outgoing: Vec<u64>,
+    incoming: Vec<u64>,
     received: Vec<u64>,
     report: FrameReport,
 }
@@ -103,8 +103,8 @@ impl<E: Exchange> Distributed<E> {
             records: vec![RankRecord::default(); ranks],
             boxes_out: Outbox::new(ranks),
             pairs_out: Outbox::new(ranks),
-            told: Vec::new(),
-            heard: Vec::new(),
+            outgoing: Vec::new(),
+            incoming: Vec::new(),
             received: Vec::new(),
             report: FrameReport::default(),
         })
@@ -132,10 +132,10 @@ impl<E: Exchange> Distributed<E> {
         &self.report
     }
 
-    /// The balance of the ranks, which decides when space is cut again.
+    /// The time of the slowest rank over that of equally busy ranks, minus one; `None` while times are unknown.
     #[must_use]
-    pub fn balance(&self) -> &Balance {
-        &self.balance
+    pub fn imbalance(&self) -> Option<f64> {
+        self.balance.imbalance()
     }
 
     /// The broad phase of this rank's region.
@@ -181,7 +181,7 @@ impl<E: Exchange> Distributed<E> {
             self.cut(boxes);
         }
         let own = self.route(boxes, ids);
-        self.tell(RankRecord { mirrored: pairs.is_mirrored(), limited: pairs.limit().is_some(), ..own });
+        self.exchange_records(RankRecord { mirrored: pairs.is_mirrored(), limited: pairs.limit().is_some(), ..own });
         self.balance.observe(&self.records);
         if let Some(error) = RankRecord::error(&self.records) {
             return Err(error);
@@ -309,16 +309,16 @@ impl<E: Exchange> Distributed<E> {
     }
 
     /// Sends this record to every rank, with the number of boxes that it gets, and receives those of all ranks.
-    fn tell(&mut self, own: RankRecord) {
-        self.told.clear();
+    fn exchange_records(&mut self, own: RankRecord) {
+        self.outgoing.clear();
         for &count in self.boxes_out.counts() {
-            self.told.extend(RankRecord { sends: count as u64, ..own }.words());
+            self.outgoing.extend(RankRecord { sends: count as u64, ..own }.words());
         }
-        self.heard.resize(self.told.len(), 0);
-        self.exchange.all_to_all(&self.told, &mut self.heard);
-        self.report.bytes_sent += 8 * (self.told.len() - record::WORDS) as u64;
+        self.incoming.resize(self.outgoing.len(), 0);
+        self.exchange.all_to_all(&self.outgoing, &mut self.incoming);
+        self.report.bytes_sent += 8 * (self.outgoing.len() - record::WORDS) as u64;
         self.records.clear();
-        self.records.extend(self.heard.chunks_exact(record::WORDS).map(RankRecord::of));
+        self.records.extend(self.incoming.chunks_exact(record::WORDS).map(RankRecord::of));
     }
 
     fn exchange_boxes(&mut self) {
@@ -360,13 +360,13 @@ impl<E: Exchange> Distributed<E> {
 
     /// Sends pairs to their owners and receives those of own boxes, unless a rank failed.
     fn return_pairs(&mut self, outcome: Outcome, pairs: &mut RankPairs) -> Result<(), Error> {
-        self.told.clear();
+        self.outgoing.clear();
         for &count in self.pairs_out.counts() {
-            self.told.extend([count as u64, outcome[0], outcome[1]]);
+            self.outgoing.extend([count as u64, outcome[0], outcome[1]]);
         }
-        self.heard.resize(self.told.len(), 0);
-        self.exchange.all_to_all(&self.told, &mut self.heard);
-        let answers = || self.heard.chunks_exact(ANSWER_WORDS);
+        self.incoming.resize(self.outgoing.len(), 0);
+        self.exchange.all_to_all(&self.outgoing, &mut self.incoming);
+        let answers = || self.incoming.chunks_exact(ANSWER_WORDS);
         if let Some(error) = answers().enumerate().find_map(|(rank, a)| error_of(rank, [a[1], a[2]])) {
             return Err(error);
         }
@@ -376,7 +376,7 @@ impl<E: Exchange> Distributed<E> {
             agree(&mut self.exchange, pairs.outcome_with(more))?;
         }
         let sent = self.pairs_out.len();
-        self.report.bytes_sent += 8 * (self.told.len() - ANSWER_WORDS + sent * PAIR_WORDS) as u64;
+        self.report.bytes_sent += 8 * (self.outgoing.len() - ANSWER_WORDS + sent * PAIR_WORDS) as u64;
         (self.report.pairs_sent, self.report.pairs_received) = (sent as u64, more as u64);
         let send_counts: Vec<usize> = self.pairs_out.counts().iter().map(|c| c * PAIR_WORDS).collect();
         self.received.resize(more * PAIR_WORDS, 0);
@@ -387,7 +387,7 @@ impl<E: Exchange> Distributed<E> {
     }
 
     fn bytes(&self) -> usize {
-        let words = self.told.capacity() + self.heard.capacity() + self.received.capacity();
+        let words = self.outgoing.capacity() + self.incoming.capacity() + self.received.capacity();
         8 * words + self.search.bytes() + self.boxes_out.bytes() + self.pairs_out.bytes()
     }
 }

@@ -7,7 +7,7 @@ use sapwise::BoxDefect;
 #[non_exhaustive]
 pub enum Error {
     /// A box that can't be ordered. If several ranks have one, that of the lowest rank.
-    #[error("box {index} of rank {rank} {}; correct it or leave it out", told(*.defect))]
+    #[error("box {index} of rank {rank} {defect}; correct it or leave it out")]
     InvalidBox {
         /// The rank.
         rank: usize,
@@ -60,14 +60,6 @@ pub enum Failure {
     /// Another error: [`Distributed::search_error`](crate::Distributed::search_error) has it on that rank.
     #[error("`search_error` on that rank says why")]
     Other,
-}
-
-fn told(defect: BoxDefect) -> &'static str {
-    match defect {
-        BoxDefect::NotANumber => "has a bound that is not a number (NaN)",
-        BoxDefect::Inverted => "is inverted: a minimum is above its maximum",
-        _ => "is invalid",
-    }
 }
 
 /// The outcome of one rank's search as words: 0 or the kind of error, and its number.

@@ -30,7 +30,7 @@
 //!   intersection of two boxes reports their pair.
 //! - The cuts follow density and predicted cost: a rank's share is the work that it does in the time that all ranks
 //!   take ([`shares`]), by its [`Tuning`](sapwise::Tuning) and the times of its frames.
-//! - The cuts are kept until the time lost to imbalance pays for new ones ([`Balance`]).
+//! - The cuts are kept until the time lost to imbalance pays for new ones.
 //! - A frame exchanges counts, then the boxes that cross, then the pairs that go back to the owners of boxes.
 //! - An error on one rank is the same [`Error`] on all ranks, with its rank.
 
@@ -48,14 +48,12 @@ mod search;
 mod share;
 mod threads;
 
-pub use balance::Balance;
 pub use bisect::bisect;
 pub use cuts::{Cuts, Region, centre};
-pub use distributed::{BOX_BYTES, Distributed, FrameReport, PAIR_BYTES, TOLD_BYTES};
+pub use distributed::{BOX_BYTES, COUNT_BYTES, Distributed, FrameReport, PAIR_BYTES};
 pub use error::{Error, Failure};
 pub use exchange::Exchange;
 pub use pairs::RankPairs;
-pub use record::RankRecord;
 pub use sample::Sample;
 pub use share::{FACTORS, costs, pair_cost, predicted_ns, shares};
 pub use threads::Threads;

@@ -8,32 +8,30 @@ pub(crate) const WORDS: usize = 8;
 
 /// What a rank reports about itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[non_exhaustive]
-pub struct RankRecord {
+pub(crate) struct RankRecord {
     /// Boxes that it sends to the receiver of this record.
-    pub sends: u64,
+    pub(crate) sends: u64,
     /// Its boxes.
-    pub boxes: u64,
+    pub(crate) boxes: u64,
     /// Its ids.
-    pub ids: u64,
+    pub(crate) ids: u64,
     /// Its first invalid box, and the defect.
-    pub defect: Option<(u64, BoxDefect)>,
+    pub(crate) defect: Option<(u64, BoxDefect)>,
     /// Boxes of its last searches, received ones included: the median; 0 if unknown.
-    pub searched: u64,
+    pub(crate) searched: u64,
     /// Nanoseconds of these searches: the median; 0 if unknown.
-    pub search_ns: u64,
+    pub(crate) search_ns: u64,
     /// Nanoseconds of the last cut.
-    pub cut_ns: u64,
+    pub(crate) cut_ns: u64,
     /// Whether its list is mirrored.
-    pub mirrored: bool,
+    pub(crate) mirrored: bool,
     /// Whether its list has a limit.
-    pub limited: bool,
+    pub(crate) limited: bool,
 }
 
 impl RankRecord {
     /// A record of boxes, and of searched boxes with their time.
-    #[must_use]
-    pub fn timed(boxes: u64, searched: u64, search_ns: u64) -> Self {
+    pub(crate) fn timed(boxes: u64, searched: u64, search_ns: u64) -> Self {
         Self { boxes, ids: boxes, searched, search_ns, ..Self::default() }
     }
 

@@ -1,4 +1,4 @@
-//! `sapwise schema`: the JSON Schemas of our files.
+//! `sapwise schema`: writes the JSON Schemas of our files.
 
 use crate::args::Schema;
 use crate::exit::Outcome;
@@ -6,7 +6,7 @@ use crate::{output, outputs};
 use sapwise_lab::write::write_text;
 use serde::Serialize;
 
-/// The answer for machines.
+/// The answer of `--json`.
 #[derive(Serialize)]
 struct Answer {
     /// The written files.

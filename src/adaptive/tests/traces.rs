@@ -261,21 +261,22 @@ fn costs(traces: &[Arc<Trace>], factor: impl Fn(&AlgorithmId) -> f64) -> Vec<Alg
     let mut ids: Vec<&AlgorithmId> = traces.iter().flat_map(|trace| &trace.ids).collect();
     ids.sort();
     ids.dedup();
-    let fitted = |id: &AlgorithmId, method: &str| {
-        let of = |trace: &Trace| trace.ids.iter().position(|i| i.method() == method && i.threads() == id.threads());
-        let points = traces.iter().zip(&loads).flat_map(|(trace, loads)| {
-            let times = of(trace).map(|k| &trace.ns[k]).into_iter();
-            times.flat_map(move |ns| loads.iter().map(move |(at, load)| (*load, ns[*at] * factor(id))))
-        });
-        fit(terms(method), &points.collect::<Vec<_>>())
+    let fitted = |id: &AlgorithmId| {
+        let mut points = Vec::new();
+        for (trace, loads) in traces.iter().zip(&loads) {
+            if let Some(k) = trace.ids.iter().position(|i| i == id) {
+                points.extend(loads.iter().map(|(at, load)| (*load, trace.ns[k][*at] * factor(id))));
+            }
+        }
+        fit(terms(id.method()), &points)
     };
-    ids.into_iter()
-        .map(|id| {
-            let curve = fitted(id, id.method());
-            let curve = if keeps(id) { curve.with_fallback(fitted(id, "bvh").work, 1.0) } else { curve };
-            AlgorithmCost::new(id.clone(), 1, curve, 0.3)
-        })
-        .collect()
+    let cost = |id: &AlgorithmId| {
+        let bvh = AlgorithmId::cpu("bvh", id.threads());
+        let curve = fitted(id);
+        let curve = if keeps(id) { curve.with_fallback(fitted(&bvh).work, 1.0) } else { curve };
+        AlgorithmCost::new(id.clone(), 1, curve, 0.3)
+    };
+    ids.into_iter().map(cost).collect()
 }
 
 #[test]

@@ -19,5 +19,4 @@ pub use measured_costs::{measured_costs, measured_costs_over, measured_slice, me
 pub(crate) use method_rows::thinned;
 pub use model::model;
 pub use rows::{Row, rows};
-pub(crate) use terms::gpu_counts;
 pub use terms::{Component, components, fallback_method};
