@@ -11,7 +11,7 @@ const DOCUMENTS: [(&str, &str); 9] = [
     ("docs/python.md", include_str!("../../../docs/python.md")),
     ("docs/research.md", include_str!("../../../docs/research.md")),
     ("docs/methodology.md", include_str!("../../../docs/methodology.md")),
-    ("docs/bias.md", include_str!("../../../docs/bias.md")),
+    ("docs/limitations.md", include_str!("../../../docs/limitations.md")),
     ("BENCHMARKS.md", include_str!("../../../BENCHMARKS.md")),
 ];
 
