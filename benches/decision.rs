@@ -1,9 +1,7 @@
 //! What one decision costs: the ranking alone, and the whole of `Adaptive::decide` with its sampled estimate.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use sapwise::{
-    Adaptive, BroadPhase, Hardware, Load, Machine, Model, Pairs, Parameter, ParameterId, Registry, Tuning,
-};
+use sapwise::{Adaptive, BroadPhase, Hardware, Load, Machine, Model, Pairs, Parameter, ParameterId, Registry, Tuning};
 use sapwise_scenes::Scenario;
 use std::hint::black_box;
 

@@ -64,7 +64,13 @@ impl OnGpus {
     }
 
     /// Finds the pairs slab by slab, `rounds` slabs for each GPU. Returns `false` if a slab is too large for its GPU.
-    fn slabs(&mut self, rounds: usize, sample: &SceneStats, boxes: &[Aabb], pairs: &mut Pairs) -> Result<bool, Failure> {
+    fn slabs(
+        &mut self,
+        rounds: usize,
+        sample: &SceneStats,
+        boxes: &[Aabb],
+        pairs: &mut Pairs,
+    ) -> Result<bool, Failure> {
         let Self { parts, slabs, workers, any_over, .. } = self;
         any_over.store(false, Ordering::Relaxed);
         let each: Vec<f64> = sizes(parts).iter().flat_map(|s| std::iter::repeat_n(s / rounds as f64, rounds)).collect();

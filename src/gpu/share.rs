@@ -7,7 +7,7 @@ use super::look::Look;
 use super::slabs::{Members, Slabs};
 use crate::aabb::Aabb;
 use crate::error::GpuError;
-use crate::load::{SampledBoxes, FramePlan};
+use crate::load::{FramePlan, SampledBoxes};
 use crate::pairs::Pairs;
 use std::time::Instant;
 

@@ -35,8 +35,7 @@ fn every_report_is_complete_and_its_label_is_true() {
         let path = path.display();
         assert!(report.provenance.optimised, "{path}");
         // Names that no version measures any more are kept beside these.
-        let known: Vec<ParameterId> =
-            report.hardware.parameters.iter().filter_map(|p| p.name.parse().ok()).collect();
+        let known: Vec<ParameterId> = report.hardware.parameters.iter().filter_map(|p| p.name.parse().ok()).collect();
         assert_eq!(known, ParameterId::ALL, "{path}");
         let restricted = report.provenance.threads.is_some() || report.provenance.simd.is_some();
         let stronger = [Label::RealContended, Label::RealSoftwareGpu].contains(&report.label);

@@ -110,13 +110,7 @@ const COLUMNS: &str = "Regret is time over the best time, less one; in parenthes
 have them (log-normal\naround 800). Crossovers off by: the median distance in octaves between measured and predicted crossovers. --card explains \
 every column.\n";
 
-fn summary(
-    model: &Model,
-    training: &Training,
-    notes: &[String],
-    path: &Path,
-    terminal: Terminal,
-) -> String {
+fn summary(model: &Model, training: &Training, notes: &[String], path: &Path, terminal: Terminal) -> String {
     let table = |rows: &[Vec<String>]| terminal.table(rows);
     let mut text = model_card::scores(&training.validation, table);
     if !training.validation.methods.is_empty() {

@@ -5,8 +5,8 @@ pub mod files;
 mod profile;
 mod selection;
 
-pub use compared::{COMPARED, COMPARED_OF_GPUS, figure};
 pub(crate) use compared::is_real;
+pub use compared::{COMPARED, COMPARED_OF_GPUS, figure};
 pub use files::{
     Document, json_files, read_document, read_report, read_reports, read_text, refuse_twice, report_files,
 };

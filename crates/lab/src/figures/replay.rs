@@ -47,7 +47,8 @@ impl Replay {
                 chart.draw_series(LineSeries::new(thinned(ns), colour(k).stroke_width(2)))?;
             }
             chart.draw_series(LineSeries::new(thinned(&self.chosen_ns), BLACK.stroke_width(2)))?;
-            let mut chart = ChartBuilder::on(&strip).margin_left(82).margin_right(12).build_cartesian_2d(frames, 0.0..1.0)?;
+            let mut chart =
+                ChartBuilder::on(&strip).margin_left(82).margin_right(12).build_cartesian_2d(frames, 0.0..1.0)?;
             text(&strip, "chosen", (74, 20), HPos::Right)?;
             let mut first = 0;
             for run in self.chosen.chunk_by(|a, b| a == b) {

@@ -38,7 +38,11 @@ pub(super) fn section(material: &Material, page: &mut Page, files: &mut Vec<(&st
     match &all[..] {
         [reference, others @ ..] if !others.is_empty() => {
             let svg = gpus(reference, others).svg()?;
-            page.figure("figure-10-gpus.svg", &svg, "Figures 10 and 11 for GPUs: the paper's parameters over those of the reference.");
+            page.figure(
+                "figure-10-gpus.svg",
+                &svg,
+                "Figures 10 and 11 for GPUs: the paper's parameters over those of the reference.",
+            );
             files.push(("figure-10-gpus.svg", svg));
         }
         _ => page.lacks("Figures 10 and 11 for GPUs: it takes two GPUs; datasets/published holds those of the paper."),
@@ -46,7 +50,9 @@ pub(super) fn section(material: &Material, page: &mut Page, files: &mut Vec<(&st
     let mut found = influences(&material.profiles)?;
     found.truncate(MOST_CROSSOVERS);
     if found.is_empty() {
-        page.lacks("Influence on crossovers: no crossover was measured on three hosts and in more reports than parameters.");
+        page.lacks(
+            "Influence on crossovers: no crossover was measured on three hosts and in more reports than parameters.",
+        );
         return Ok(());
     }
     let mut columns: Vec<&str> = found.iter().flat_map(|i| &i.rises).map(|r| r.0).collect();
@@ -77,7 +83,9 @@ fn cpus(reference: &Profile, others: &[&Profile]) -> Ratios {
     };
     let mut rows: Vec<(String, Vec<Option<f64>>)> = COMPARED.into_iter().map(parameter).collect();
     let faster: Vec<_> = others.iter().map(|p| speed_ups(reference, p)).collect();
-    for id in reference.available().into_iter().filter(|id| id.threads() == 1 && !faster.iter().all(|f| !f.contains_key(id))) {
+    for id in
+        reference.available().into_iter().filter(|id| id.threads() == 1 && !faster.iter().all(|f| !f.contains_key(id)))
+    {
         let ratios = faster.iter().map(|f| f.get(&id).copied()).collect();
         rows.push((format!("speed of {}", id.method()), ratios));
     }

@@ -14,8 +14,7 @@ fn table(columns: &str, rows: impl Iterator<Item = Vec<String>>) -> Result<Strin
 
 /// Every median and mean time of the studied reports.
 pub(super) fn timings(material: &Material) -> Result<String> {
-    let columns =
-        "report host scenario algorithm method processor threads gpus objects pairs moved median_ns mean_ns";
+    let columns = "report host scenario algorithm method processor threads gpus objects pairs moved median_ns mean_ns";
     let mut rows = Vec::new();
     for profile in &material.profiles {
         for spot in &profile.points {

@@ -56,7 +56,12 @@ pub(super) fn section(material: &Material, page: &mut Page, files: &mut Vec<(&st
     let figures = [
         (Compared::CpuAndGpu, "figure-4-cpu-gpu.svg", "Figure 4: CPU and GPU", "no report has timings of both"),
         (Compared::Gpus, "figure-6-gpus.svg", "Figure 6: one and several GPUs", "no report has several GPUs"),
-        (Compared::Threads, "figure-7-threads.svg", "Figure 7: one and several threads", "no report has several threads"),
+        (
+            Compared::Threads,
+            "figure-7-threads.svg",
+            "Figure 7: one and several threads",
+            "no report has several threads",
+        ),
     ];
     for (compared, file, what, lack) in figures {
         let mut hosts = material.best_of_hosts(|p| (compared.is_in(p), compared.sides(p).len(), p.points.len()));
@@ -75,7 +80,11 @@ pub(super) fn section(material: &Material, page: &mut Page, files: &mut Vec<(&st
             let panels = hosts.iter().map(|p| CurvePanel { curves: speed_ups(p), ..titled(p) }).collect();
             let title = "Speed-up over the number of threads".to_owned();
             let svg = Curves { title, x_name: "threads", y_name: "speed-up", panels }.svg()?;
-            page.figure("speed-up.svg", &svg, "Speed-up of each method over one thread, geometric mean over frames of 1000 objects or more.");
+            page.figure(
+                "speed-up.svg",
+                &svg,
+                "Speed-up of each method over one thread, geometric mean over frames of 1000 objects or more.",
+            );
             files.push(("speed-up.svg", svg));
         }
     }
@@ -182,7 +191,9 @@ mod tests {
         let reports = vec![("a.json".to_owned(), Machine::family()[2].report())];
         let material = Material::new(reports, &crate::progress::Silent).unwrap();
         let profile = &material.profiles[0];
-        assert!(Compared::Threads.is_in(profile) && !Compared::Gpus.is_in(profile) && !Compared::CpuAndGpu.is_in(profile));
+        assert!(
+            Compared::Threads.is_in(profile) && !Compared::Gpus.is_in(profile) && !Compared::CpuAndGpu.is_in(profile)
+        );
         let panel = panel(&material, profile, Compared::Threads);
         assert!(panel.curves.len() > 1 && panel.curves[0].name == "1 thread", "{panel:?}");
         let spot = profile.points.iter().find(|s| s.scenario == profile.usual_scenario()).unwrap();
