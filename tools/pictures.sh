@@ -12,9 +12,9 @@ sapwise=${CARGO_TARGET_DIR:-target}/release/sapwise
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-"$sapwise" study datasets datasets/published --out "$work/study" > "$work/study.txt"
+"$sapwise" study datasets --out "$work/study" > "$work/study.txt"
 for figure in figure-7-threads field-map; do
   cp "$work/study/figures/$figure.svg" "$out/$figure.svg"
 done
-"$sapwise" run fragmentation --objects 20000 --tuning datasets/amd-epyc-zen3-2c-full--2026-11-22.json --no-gpus --plot "$out/fragmentation.svg"
+"$sapwise" run fragmentation --objects 20000 --tuning datasets/amd-epyc-zen3-2c/full.json --no-gpus --plot "$out/fragmentation.svg"
 echo "The pictures are in $out."

@@ -9,14 +9,14 @@
 
 use anyhow::{Context, Result};
 use sapwise::{Model, Registry};
-use sapwise_lab::data::{Evidence, Selection, read_reports};
+use sapwise_lab::data::{Selection, read_reports};
 use sapwise_lab::figures::{Figure, Picture, RanksPicture};
 use sapwise_lab::progress::Silent;
 use sapwise_lab::ranks::{Network, RankScene, RanksRow, read_rows, write_rows};
 use sapwise_scenes::Scenario;
 
 /// Whose times are predicted.
-const REPORT: &str = "datasets/amd-epyc-zen3-2c-full--2026-11-22.json";
+const REPORT: &str = "datasets/amd-epyc-zen3-2c/full.json";
 /// Each with its largest number of boxes: of the other two 64 millions have more pairs than 12 GiB hold beside them.
 const SCENARIOS: [(Scenario, usize); 3] =
     [(Scenario::Uniform, 64), (Scenario::Clustered, 16), (Scenario::Fragmentation, 16)];
@@ -54,7 +54,7 @@ fn main() -> Result<()> {
 /// So many boxes of a scenario over every number of ranks.
 pub(crate) fn count(scenario: Scenario, boxes: usize) -> Result<Vec<RanksRow>> {
     let reports = read_reports(&[REPORT.into()], &Silent)?;
-    let (profiles, _) = Selection::of(&reports, Evidence::Real).finish();
+    let (profiles, _) = Selection::of(&reports).finish();
     let profile = profiles.first().context("the report can't be trained on")?;
     let algorithms = profile.with_revisions(&profile.available());
     let tuning = Model::built_in()?.predict(&profile.hardware, &algorithms)?.tuning("uniform", &[]);

@@ -11,9 +11,8 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  sapwise study datasets datasets/published --out study
-  sapwise study reports/ --out pair --reference reports/a.json --machine reports/b.json
-  sapwise study --simulated simulated datasets/published --out simulated-study")]
+  sapwise study datasets --out study
+  sapwise study reports/ --out pair --reference reports/a.json --machine reports/b.json")]
 pub(crate) struct Study {
     /// Reports, or folders whose *.json files are reports. Files that can't be read are named on the page.
     #[arg(required = true, value_name = "REPORT")]
@@ -21,9 +20,6 @@ pub(crate) struct Study {
     /// The folder that the study goes to: new, empty, or that of an earlier study, whose files it replaces.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
-    /// Study simulated reports instead of real ones; the two are never mixed.
-    #[arg(long)]
-    pub(crate) simulated: bool,
     /// The report that others are compared with. Without this option the first one of a whole machine.
     #[arg(long, value_name = "REPORT")]
     pub(crate) reference: Option<PathBuf>,

@@ -5,7 +5,6 @@ use crate::exit::{Outcome, WrongUsage};
 use crate::progress::Progress;
 use crate::terminal::Terminal;
 use crate::{interrupt, output, shell};
-use sapwise_lab::data::Evidence;
 use sapwise_lab::spread;
 use sapwise_lab::study::{NotAmongReports, PAGE, Sources, Study, Summary, prepare};
 use sapwise_lab::text::count;
@@ -31,15 +30,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     if arguments.json {
         output::print_json(&summary)?;
     } else {
-        output::print(&text(&summary, &arguments.out, arguments.simulated))?;
+        output::print(&text(&summary, &arguments.out))?;
     }
     Ok(Outcome::Done)
 }
 
 fn write(arguments: &Arguments, sources: &Sources) -> anyhow::Result<(Study, Summary)> {
-    let evidence = if arguments.simulated { Evidence::Simulated } else { Evidence::Real };
     let progress = Progress::new(0);
-    let study = Study::of(sources, evidence, command(arguments), &progress)?;
+    let study = Study::of(sources, command(arguments), &progress)?;
     progress.message("drawing");
     let summary = study.write(&arguments.out, &progress)?;
     Ok((study, summary))
@@ -52,7 +50,6 @@ const MOST_PATHS: usize = 6;
 /// a path that begins there the last name stands.
 fn command(arguments: &Arguments) -> String {
     let mut words = vec!["sapwise study".to_owned()];
-    words.extend(arguments.simulated.then(|| "--simulated".to_owned()));
     match &arguments.reports[..] {
         few if few.len() <= MOST_PATHS => words.extend(few.iter().map(|p| shown(p))),
         many => words.push(format!("({} reports or folders)", many.len())),
@@ -70,12 +67,10 @@ fn shown(path: &Path) -> String {
     shell::quoted(&text)
 }
 
-fn text(summary: &Summary, out: &Path, simulated: bool) -> String {
+fn text(summary: &Summary, out: &Path) -> String {
     let studied = summary.reports.iter().filter(|r| r.left_out.is_none()).count();
-    let machines =
-        if simulated { "simulated machines, which are no evidence of how fast any is" } else { "physical machines" };
     let mut text = format!(
-        "{} read, the timings of {studied} studied; {machines}: {}\n\n",
+        "{} read, the timings of {studied} studied; physical machines: {}\n\n",
         count(summary.reports.len(), "report"),
         summary.physical_machines
     );

@@ -9,7 +9,7 @@ use crate::terminal::Terminal;
 use crate::{interrupt, output, outputs, shell};
 use rayon::prelude::*;
 use sapwise::Model;
-use sapwise_lab::data::{Evidence, Selection, read_report, report_files};
+use sapwise_lab::data::{Selection, read_report, report_files};
 use sapwise_lab::evaluate::importance;
 use sapwise_lab::figures::{Figure, TrainingPicture};
 use sapwise_lab::write::{write_atomically, write_text};
@@ -17,7 +17,7 @@ use sapwise_lab::{Trained, Training, Validation, model_card, train, write_model}
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Reports that are in memory at the same time: a full one has a megabyte, ten thousand have ten gigabytes.
+/// Reports in memory at the same time. A full one takes some megabytes.
 const AT_A_TIME: usize = 64;
 
 /// The answer for machines.
@@ -32,7 +32,6 @@ struct Answer<'a> {
 pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     let name = name(arguments)?;
     let plot = arguments.plot.as_deref().map(|path| Ok::<_, WrongUsage>((path, picture_format(path)?))).transpose()?;
-    let evidence = if arguments.simulated { Evidence::Simulated } else { Evidence::Real };
     let reports = report_files(&arguments.reports)?;
     let outputs =
         [Some(&arguments.out), arguments.card.as_ref(), arguments.plot.as_ref(), arguments.importance.as_ref()];
@@ -40,7 +39,7 @@ pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     outputs::check(&reports, &outputs)?;
     interrupt::listen()?;
     let progress = Progress::new(reports.len() as u64);
-    let (selection, doubtful) = select(&reports, evidence, &progress)?;
+    let (selection, doubtful) = select(&reports, &progress)?;
     let importance =
         arguments.importance.as_ref().map(|_| importance(&selection.clone().finish().0, &progress)).transpose()?;
     let Trained { model, training, mut notes, held_out } = train(selection, &name, &progress)?;
@@ -55,7 +54,7 @@ pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
         write_text(path, &page)?;
     }
     if let Some((path, format)) = plot {
-        let caption = caption(&model, &training, &command(arguments, path));
+        let caption = caption(&training, &command(arguments, path));
         let picture = TrainingPicture::new(&held_out).draw(format, &caption)?;
         write_atomically(path, |out| Ok(out.write_all(&picture)?))?;
     }
@@ -76,12 +75,12 @@ pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Reports whose figures are doubtful, with their names.
+/// Doubtful reports.
 #[derive(Default)]
 struct Doubtful(Vec<(PathBuf, Vec<String>)>);
 
 impl Doubtful {
-    /// All doubts about reports that the user named; of those in folders their number.
+    /// Returns all doubts about reports that the user named, and the number of doubtful reports in folders.
     fn notes(&self, named: &[PathBuf]) -> Vec<String> {
         let (own, in_folders): (Vec<_>, Vec<_>) = self.0.iter().partition(|(path, _)| named.contains(path));
         let of = |(path, doubts): &(PathBuf, Vec<String>)| {
@@ -97,16 +96,16 @@ impl Doubtful {
     }
 }
 
-/// Reads the reports on all cores, some at a time, and keeps of each what is trained on.
-fn select(files: &[PathBuf], evidence: Evidence, progress: &Progress) -> anyhow::Result<(Selection, Doubtful)> {
+/// Reads the reports on all cores, some at a time, and keeps what is trained on.
+fn select(files: &[PathBuf], progress: &Progress) -> anyhow::Result<(Selection, Doubtful)> {
     progress.message("reading");
-    let mut selection = Selection::new(evidence);
+    let mut selection = Selection::default();
     let mut doubtful = Doubtful::default();
     for some in files.chunks(AT_A_TIME) {
         interrupt::check()?;
         let read = |file: &PathBuf| {
             let (name, report) = read_report(file, &|text| progress.warn(text))?;
-            Ok((doubts(&report), selection.reduce(&name, &report)))
+            Ok((doubts(&report), Selection::reduce(&name, &report)))
         };
         let reduced: Vec<_> = some.par_iter().map(read).collect::<anyhow::Result<_>>()?;
         for (file, (doubts, reduced)) in some.iter().zip(reduced) {
@@ -120,7 +119,7 @@ fn select(files: &[PathBuf], evidence: Evidence, progress: &Progress) -> anyhow:
     Ok((selection, doubtful))
 }
 
-/// The name that the user gave, or that of the file.
+/// Returns the name that the user gave, or that of the file.
 fn name(arguments: &Train) -> anyhow::Result<String> {
     let stem = || arguments.out.file_stem().map(|s| s.to_string_lossy().into_owned());
     let name = arguments.name.clone().or_else(stem).unwrap_or_default();
@@ -131,11 +130,10 @@ fn name(arguments: &Train) -> anyhow::Result<String> {
 }
 
 /// What stands below the picture.
-fn caption(model: &Model, training: &Training, command: &str) -> Vec<String> {
-    let simulated = if model.simulated { "Simulated machines, no evidence of accuracy. " } else { "" };
+fn caption(training: &Training, command: &str) -> Vec<String> {
     let machines = training.validation.physical_machines;
     let plural = if machines == 1 { "" } else { "s" };
-    vec![format!("{simulated}{machines} physical machine{plural}."), format!("Made by: {command}")]
+    vec![format!("{machines} physical machine{plural}."), format!("Made by: {command}")]
 }
 
 /// The command that makes the picture again, without folders, which are of this machine alone.
@@ -145,14 +143,12 @@ fn command(arguments: &Train, plot: &Path) -> String {
         [one] => name(one),
         many => format!("({} reports or folders)", many.len()),
     };
-    let simulated = if arguments.simulated { " --simulated" } else { "" };
-    format!("sapwise train{simulated} {reports} --out {} --plot {}", name(&arguments.out), name(plot))
+    format!("sapwise train {reports} --out {} --plot {}", name(&arguments.out), name(plot))
 }
 
-/// What the columns in the summary mean, in few words.
-const COLUMNS: &str = "Regret is time over the best time, less one; in parentheses with the numbers of objects weighted as games are assumed to \
-have them (log-normal\naround 800). Crossovers off by: the median distance in octaves between measured and predicted crossovers. --card explains \
-every column.\n";
+/// What the columns of the summary mean.
+const COLUMNS: &str = "Regret is time over the best time, less one; in parentheses weighted by how often games are assumed to have that many \
+objects (log-normal\naround 800). Crossovers off by: median distance between measured and predicted crossovers. --card explains every column.\n";
 
 fn summary(
     model: &Model,

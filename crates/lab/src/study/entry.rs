@@ -70,7 +70,7 @@ impl Entry {
 
     /// Of two reports of one machine the greater one had more of it: it was whole, had more cores and longer vectors.
     pub(super) fn wholeness(&self) -> (bool, u64, u64) {
-        let whole = matches!(self.kind, Label::RealFull | Label::Simulated);
+        let whole = self.kind == Label::RealFull;
         let count = |id| self.hardware.value(id).map_or(0, |v| v as u64);
         (whole, count(ParameterId::UsableCores), count(ParameterId::SimdLanes))
     }

@@ -5,7 +5,7 @@ use super::curves::{self, Compared};
 use super::entry::{Entry, representatives};
 use super::sources::{self, Sources};
 use crate::Report;
-use crate::data::{Evidence, Profile, read_report, usual_scenario};
+use crate::data::{Profile, read_report, usual_scenario};
 use crate::evaluate::{HeldOut, Importance, importance};
 use crate::fit::measured_tuning;
 use crate::progress::Progress;
@@ -44,8 +44,8 @@ impl Study {
     ///
     /// # Errors
     /// When none of the reports can be read; when the user asked to stop.
-    pub fn of(sources: &Sources, evidence: Evidence, command: String, progress: &dyn Progress) -> Result<Self> {
-        let sources::Read { mut entries, selection, unreadable } = sources.read(evidence, progress)?;
+    pub fn of(sources: &Sources, command: String, progress: &dyn Progress) -> Result<Self> {
+        let sources::Read { mut entries, selection, unreadable } = sources.read(progress)?;
         let (profiles, mut notes) = selection.clone().finish();
         sources::mark_studied(&mut entries, &profiles, &notes);
         let importance = match profiles.is_empty() {

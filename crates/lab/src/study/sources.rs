@@ -1,7 +1,7 @@
 //! The files of a study: read, reduced and told apart.
 
 use super::entry::{Entry, names};
-use crate::data::{Evidence, Profile, Selection, read_report, report_files};
+use crate::data::{Profile, Selection, read_report, report_files};
 use crate::progress::Progress;
 use anyhow::{Result, bail};
 use rayon::prelude::*;
@@ -62,11 +62,11 @@ impl Sources {
     ///
     /// # Errors
     /// When none of them can be read; when the user asked to stop.
-    pub(super) fn read(&self, evidence: Evidence, progress: &dyn Progress) -> Result<Read> {
+    pub(super) fn read(&self, progress: &dyn Progress) -> Result<Read> {
         let Self { files, names, .. } = self;
         progress.start(files.len() as u64);
         progress.message("reading");
-        let mut found = Read { entries: Vec::new(), selection: Selection::new(evidence), unreadable: Vec::new() };
+        let mut found = Read { entries: Vec::new(), selection: Selection::default(), unreadable: Vec::new() };
         let placed: Vec<(usize, &PathBuf)> = files.iter().enumerate().collect();
         for some in placed.chunks(AT_A_TIME) {
             progress.check()?;
@@ -76,7 +76,7 @@ impl Sources {
                     (place, Err(why.root_cause().to_string().replace(&file.display().to_string(), &names[place])))
                 }
                 Ok((_, report)) => {
-                    let reduced = found.selection.reduce(&names[place], &report);
+                    let reduced = Selection::reduce(&names[place], &report);
                     let studied = reduced.as_ref().map(|_| ()).map_err(ToString::to_string);
                     (place, Ok((Entry::new(file, &names[place], report, studied), reduced)))
                 }

@@ -1,7 +1,6 @@
 //! The first words of the page: what was read, and what these machines can and can't say.
 
 use crate::MethodScore;
-use crate::label_text::is_evidence;
 use crate::spread;
 use crate::study::influence::Influence;
 use crate::study::material::Study;
@@ -26,12 +25,6 @@ pub(in crate::study) fn lead(study: &Study, influence: &Influence) -> Vec<String
 pub(in crate::study) fn can_say(study: &Study, influence: &Influence) -> Vec<String> {
     let studied = study.studied();
     let mut said = Vec::new();
-    if studied.iter().any(|&k| !is_evidence(study.entries[k].kind)) {
-        said.push(
-            "These machines are simulated: they show what the cost model that made them says, and are no evidence of how fast any machine is."
-                .to_owned(),
-        );
-    }
     match influence.machines {
         0 => said.push("No report has timings that can be studied; the section on limits says why.".to_owned()),
         1 => said.push(format!(
