@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Regret of tunings on reports, by a program of its own: a check of `crates/lab/src/evaluate/regret_table.rs`, and of a model on reports that came after it.
+"""Regret of tunings on reports: a second implementation of `crates/lab/src/evaluate/regret_table.rs`, for blind tests of a model.
 
-    sapwise predict --report R.json --json > tunings/R.json     # for each report
-    tools/reference/regret.py tunings R.json ...
+    sapwise predict --report datasets/HOST/full.json --json > tunings/HOST/full.json     # for each report
+    tools/reference/regret.py tunings datasets/HOST/full.json ...
 
-Prints for each report the mean regret over all cells and as in games, in percent, of the tuning of the same name, of its physical terms alone
-(without the residual), and of the best of each cell itself where the name of the report ends in `-again`: the noise floor. Reports that hold
-algorithms on GPUs are left out. Needs Python 3.8 and nothing else.
+Prints for each report the mean regret over all cells and, in parentheses, weighted as in games, in percent: of the tuning of the same
+name, of its physical terms without the residual, and, for a report whose name ends in `-again`, of the best choice in the report that it
+repeats: the noise floor. Skips reports with algorithms on GPUs. Needs Python 3.8 only.
 """
 
 import json
@@ -20,20 +20,20 @@ FEWEST_SAMPLES = 3
 
 
 def read(path):
-    """Points of a report: scenario, load, median of each algorithm; none where an algorithm is on a GPU."""
+    """Returns the points of a report: scenario, load, median of each algorithm; none if an algorithm is on a GPU."""
     report = json.loads(pathlib.Path(path).read_text())
     if any("@gpu" in a["id"] for a in report["algorithms"]):
         return None
     points = []
     for point in report["points"]:
-        sound = [t for t in point["timings"] if t["error"] is None and len(t["samples_ns"]) >= FEWEST_SAMPLES]
+        sound = [t for t in point["timings"] if t.get("error") is None and len(t["samples_ns"]) >= FEWEST_SAMPLES]
         medians = {t["algorithm"]: statistics.median(t["samples_ns"]) for t in sound}
         points.append((point["scenario"], point["load"], medians))
     return points
 
 
 def table(points):
-    """For each cell, a scenario and a quarter of a decade: its loads, and for each algorithm its cost over the least."""
+    """Returns for each cell, a scenario and a quarter of a decade, its loads and the cost of each algorithm over the least."""
     cells = {}
     for scenario, load, medians in points:
         cells.setdefault((scenario, round(4 * math.log10(max(load["objects"], 1)))), []).append((load, medians))
@@ -53,7 +53,7 @@ def table(points):
 
 
 def ln_costs(of_cell):
-    """The algorithms' part of logarithms that are the sum of a part of the algorithm and one of the point."""
+    """Splits the logarithms of times into a part of the algorithm and one of the point, and returns the former."""
     shared, costs = [0.0] * len(of_cell), {}
     for _ in range(8):
         lists = {}
@@ -66,7 +66,7 @@ def ln_costs(of_cell):
 
 
 def regret(cells, choose):
-    """Mean over the cells, and weighted as games are assumed to have that number of objects; percent."""
+    """Returns the mean over the cells, and the same weighted as in games, in percent."""
     pairs = []
     for (scenario, quarter), (loads, over_best) in cells.items():
         chosen = [over_best.get(choose(scenario, quarter, load), NOT_TIMED) - 1 for load in loads]
@@ -87,7 +87,7 @@ def coordinates(load, octaves):
 
 
 def residual(weights, by_motion, places, load):
-    """The logarithm of a factor, as `src/cost/residual.rs` has it."""
+    """Returns the logarithm of the residual, as `src/cost/residual.rs` does."""
     if not weights:
         return 0.0
     sizes = [math.log2(max(p["objects"], 1)) for p in places]
@@ -99,7 +99,7 @@ def residual(weights, by_motion, places, load):
 
 
 def work_ns(tuning, k, load, corrected):
-    """Nanoseconds on one thread, or on GPUs."""
+    """Returns nanoseconds on one thread, or on GPUs."""
     work = tuning["works"][k]
     n = load["objects"]
     counts = dict(load, call=1, all_pairs=n * (n - 1) / 2, sort=n * math.log2(max(n, 1)), moved=n * load["moved"])
@@ -112,7 +112,7 @@ def work_ns(tuning, k, load, corrected):
 
 
 def cost(tuning, algorithm, load, corrected):
-    """Nanoseconds of an algorithm, as `src/cost.rs` has it."""
+    """Returns nanoseconds of an algorithm, as `src/cost.rs` does."""
     ns = work_ns(tuning, algorithm["work"], load, corrected)
     helpers = algorithm["helpers"]
     if helpers:
@@ -124,7 +124,8 @@ def cost(tuning, algorithm, load, corrected):
             ns = called / most * helpers["call_ns"] + min(ns, (ns + helpers["late_ns"]) / speed_up)
     observed = algorithm["observed"] if corrected else None
     if observed:
-        ns *= math.exp(observed["constant"] + residual(observed["weights"], observed["by_motion"], tuning.get("places", []), load))
+        places = tuning.get("places", [])
+        ns *= math.exp(observed["constant"] + residual(observed["weights"], observed["by_motion"], places, load))
     return ns
 
 
@@ -138,7 +139,8 @@ def main():
         if points is None:
             continue
         cells, columns = table(points), ["-"] * 3
-        tuning = tunings / path.name
+        name = f"{path.parent.name}/{path.name}"
+        tuning = tunings / name
         if tuning.is_file():
             held = json.loads(tuning.read_text())
             for column, corrected in enumerate((True, False)):
@@ -157,7 +159,7 @@ def main():
 
             shared = {at: cell for at, cell in cells.items() if at in known}
             columns[2] = "%.2f (%.2f)" % regret(shared, known_best)
-        print(f"{path.name:<48} {columns[0]:>15} {columns[1]:>15} {columns[2]:>15}")
+        print(f"{name:<48} {columns[0]:>15} {columns[1]:>15} {columns[2]:>15}")
 
 
 if __name__ == "__main__":

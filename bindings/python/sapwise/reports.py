@@ -1,7 +1,6 @@
 """Reports as tables: one row for each algorithm, scenario and number of boxes."""
 
 import json
-import re
 from pathlib import Path
 
 import numpy as np
@@ -55,8 +54,7 @@ def read_reports(folder):
     Parameters
     ----------
     folder : path
-        Each ``*.json`` in it whose schema is ``report/...`` is read, in the order of the names. Folders in it are not
-        read.
+        Each ``*.json`` in it and in folders in it whose schema is ``report/...`` is read, in the order of the paths.
 
     Returns
     -------
@@ -82,7 +80,7 @@ def read_reports(folder):
     if not folder.is_dir():
         raise InputError(f"{folder} is no folder; read_report reads one file")
     rows = []
-    for path in sorted(folder.glob("*.json")):
+    for path in sorted(folder.rglob("*.json")):
         rows.extend(_rows(path, among_others=True))
     if not rows:
         raise InputError(f"{folder} holds no report; `sapwise probe --out {folder}/report.json` makes one")
@@ -113,12 +111,12 @@ def _timings(path, report):
     parameters = {p["name"]: np.nan if p["value"] is None else float(p["value"]) for p in hardware["parameters"]}
     revisions = {a["id"]: a["revision"] for a in report["algorithms"]}
     of_file = {
-        "file": path.name,
+        "file": f"{path.parent.name}/{path.name}",
         "host": _host(machine, parameters),
         "cpu": machine["cpu"],
         "simd": machine["simd"],
         "hypervisor": machine["hypervisor"],
-        "profile": _profile(path, report),
+        "profile": _profile(report),
         "label": report["label"],
         "date": report["provenance"]["date"],
         "gpus": ", ".join(of["gpu"]["name"] for of in hardware.get("gpus", [])),
@@ -150,7 +148,7 @@ def _timings(path, report):
                 "q25_ns": low,
                 "q75_ns": high,
                 "samples": len(timing["samples_ns"]),
-                "error": timing["error"] or "",
+                "error": timing.get("error") or "",
                 **parameters,
             }
 
@@ -167,12 +165,11 @@ def _host(machine, parameters):
     return f"{machine['physical_id']}-{1000 * clock:.0f}"
 
 
-def _profile(path, report):
-    """Return the restriction, from the name ``<cpu>-<cores>c-<profile>--<date>.json``, else from the provenance."""
-    named = re.fullmatch(r".+?-\d+c-(.+)--\d{4}-\d\d-\d\d", path.stem)
-    if named:
-        return named.group(1)
-    return "-".join(report["provenance"].get("restriction", {}).get("kinds", [])) or "full"
+def _profile(report):
+    """Return the restriction, as in ``avx2-1t``; ``full`` without any."""
+    simd, threads = report["provenance"]["simd"], report["provenance"]["threads"]
+    gpus = "software-gpus" if report["label"] == "real_software_gpu" else None
+    return "-".join(part for part in (gpus, simd, threads and f"{threads}t") if part) or "full"
 
 
 def _quartiles(samples):

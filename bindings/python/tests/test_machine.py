@@ -87,7 +87,7 @@ def test_a_probe_tells_of_each_family():
     assert value["usable_cores"] == len(os.sched_getaffinity(0)) and value["memory_bytes"] > 1e8
     assert set(hardware.parameters["unit"]) > {"cores", "GHz"}
     assert hardware.machine["os"] == "linux" and "host" not in hardware.machine
-    report = json.loads((ROOT / "datasets/amd-epyc-zen3-2c-full--2026-11-22.json").read_text())
+    report = json.loads((ROOT / "datasets/amd-epyc-zen3-2c/full.json").read_text())
     assert set(names) == {p["name"] for p in report["hardware"]["parameters"]}
 
 
@@ -109,7 +109,7 @@ def command(tmp_path, body):
 
 
 def test_a_report_by_the_command(tmp_path):
-    example = ROOT / "datasets/amd-epyc-zen3-2c-full--2026-11-22.json"
+    example = ROOT / "datasets/amd-epyc-zen3-2c/full.json"
     told = []
     copies = (
         f"print('one\\ntwo', file=sys.stderr)\nshutil.copy({str(example)!r}, sys.argv[3])\n"

@@ -1,11 +1,11 @@
 //! Trains on all reports of a folder but those of one machine, and prints what choices cost on one of its reports.
 //!
 //! ```text
-//! cargo run --release -p sapwise-lab --example leave_one_out -- datasets/earlier amd-epyc-2c-full--2026-11-21.json
+//! cargo run --release -p sapwise-lab --example leave_one_out -- datasets amd-epyc-zen3-2c/full.json
 //! ```
 
 use anyhow::{Context, Result};
-use sapwise_lab::data::{Evidence, Selection, read_reports};
+use sapwise_lab::data::{Selection, read_reports};
 use sapwise_lab::evaluate::{Regret, RegretTable, by_costs};
 use sapwise_lab::progress::Silent;
 use sapwise_lab::spread;
@@ -23,7 +23,7 @@ fn main() -> Result<()> {
 /// The regret on a report of the model that was trained without its machine, and of each algorithm when it is chosen always.
 pub(crate) fn leave_one_out(folder: &Path, file: &str) -> Result<String> {
     let reports = read_reports(&[folder.to_owned()], &Silent)?;
-    let (profiles, _) = Selection::of(&reports, Evidence::Real).finish();
+    let (profiles, _) = Selection::of(&reports).finish();
     let profile = profiles.iter().find(|p| p.file == file).context("there is no such report to be trained on")?;
     let (model, held_out) = sapwise_lab::without(&profiles, file)?;
     let available = profile.available();

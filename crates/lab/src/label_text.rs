@@ -10,7 +10,6 @@ pub fn kind(label: Label) -> &'static str {
         Label::RealRestricted => "real_restricted",
         Label::RealContended => "real_contended",
         Label::RealSoftwareGpu => "real_software_gpu",
-        Label::Simulated => "simulated",
         Label::Published => "published",
     }
 }
@@ -23,7 +22,6 @@ pub fn meaning(label: Label) -> &'static str {
         Label::RealRestricted => "fewer cores or a lower level of vector instructions than the machine has",
         Label::RealContended => "other programs took part of the machine",
         Label::RealSoftwareGpu => "the GPU is a software adapter, which runs on the CPU",
-        Label::Simulated => "made from a specification, not measured",
         Label::Published => "parameters from a publication, without timings",
     }
 }

@@ -8,11 +8,11 @@
 //! 4. [`train()`]: all of it, with what [`Training`] says of itself.
 //!
 //! ```no_run
-//! use sapwise_lab::data::{Evidence, read_reports};
+//! use sapwise_lab::data::{Selection, read_reports};
 //! use sapwise_lab::progress::Silent;
 //!
 //! let reports = read_reports(&["datasets".into()], &Silent)?;
-//! let trained = sapwise_lab::train(sapwise_lab::data::Selection::of(&reports, Evidence::Real), "mine", &Silent)?;
+//! let trained = sapwise_lab::train(Selection::of(&reports), "mine", &Silent)?;
 //! for score in &trained.training.validation.methods {
 //!     println!("{}: {}", score.name, sapwise_lab::spread::percent(score.mean_regret, score.regret_range(), 1));
 //! }

@@ -6,81 +6,57 @@ use crate::{Regrets, Split, Training, Validation};
 use sapwise::hardware::with_unit;
 use sapwise::model::MethodModel;
 use sapwise::{BackendClass, Model};
+use std::collections::BTreeMap;
 
-/// What every model of this kind is, whatever it was trained on.
+/// Method and use, the same for every model.
 const USE: &str = "
-Predicts, from the hardware parameters of a machine, what each broad-phase algorithm costs under a load; `predict` derives
-from that which algorithm is fastest where. The time of a frame on one thread is a sum of physical terms with non-negative units (calls,
-objects and how far they move, comparisons of a sort, objects outside the cache, pairs and candidates tested), each
-scaled by the parameter that it depends on (clock, SIMD lanes, memory bandwidth), times the exponential of a residual: a Gaussian process over the
-load, which the hardware does not enter. `pair-cache` takes the less of its own terms and of what `bvh` takes. On several threads a frame takes what it
-costs to call the helpers and the less of the work of one thread and of that work, with what is lost while they wake, divided by their speed-up: a
-helper that comes too late costs its call only. All figures are fitted on relative error, robustly, and are shared by all machines and thread counts.
+Predicts the time of each broad-phase algorithm from the hardware parameters of a machine and the load of a frame; `sapwise predict` derives which
+algorithm is fastest where. The time on one thread is a sum of physical terms with non-negative units: calls, objects, sorting, objects outside the
+cache, tests, pairs, motion. Each term scales with a parameter: clock, SIMD lanes or memory bandwidth. A Gaussian process over the load, the residual,
+multiplies the sum. `pair-cache` takes the smaller of its own sum and that of `bvh`. On several threads the work is divided by the speed-up, plus the
+calls of the helpers and what is lost while they wake up. All machines share these units.
 
-Regret is the time of the choice over the time of the best choice, less one, on reports that the fit did not see: the mean in
-each quarter of a decade of each scenario, and the mean over these. A choice that was not timed at a point is charged what it cost,
-relative to the best, at the nearest size of the scenario at which it was timed, up to twice as many objects or half as many;
-beyond that, because the algorithm had left the race, ten times the best.
-
-Not for timing promises: a cost may be off by more than the choice that follows from it.";
+Not for timing promises: a predicted time may be further off than the choice that follows from it.";
 
 /// Of a model without GPUs, after [`USE`].
-const NO_GPUS: &str = "Not for GPUs.\n";
+const NO_GPUS: &str = " Not for GPUs.\n";
 
 /// Of a model with GPUs, after [`USE`].
 const GPUS: &str = "
-On GPUs the terms are round trips, dependent dispatches, bytes up and down, bytes moved within the GPU's memory, operations for
-the candidates, and the cycles that the CPU spends on boxes and pairs; several GPUs count with the slowest latency and the sum of
-their rates, no more than what the group was measured to gain. Timings on software adapters serve only where there is no
-real GPU in the training, and a prediction for a kind of GPU that was not in it says so.
+
+On GPUs the terms are round trips, dependent dispatches, bytes up and down, bytes moved within the memory of the GPU, tests, and the cycles that the
+CPU spends on boxes and pairs. Several GPUs count with the slowest latency and the sum of their rates. Software adapters are used only if no real GPU was
+in the training.
 ";
 
-/// Of a model that was trained on simulated machines, before [`USE`].
-const SIMULATED: &str = "
-**Trained on simulated machines**, whose timings a cost model made up: nothing here is evidence of how well a prediction does on a
-real machine, and `predict` warns of it.
-";
-
-/// What the columns of the scores mean, below them.
+/// What the columns of the scores mean.
 const COLUMNS: &str = "
-Each figure is the mean regret over all sizes and, in parentheses, where each number of objects counts as often as games have it. The latter is an
-assumption, not a count: log-normal around 800 objects, two thirds of the frames within 220 to 2800. Every physical machine counts the same.
+Regret is the time of the chosen algorithm over that of the best one, less one. Each number is the mean over scenarios and quarters of a decade of
+objects and, in parentheses, weighted by how often games have that many objects. That weight is an assumption: log-normal around 800, two thirds of the
+frames between 220 and 2800. Every host counts the same. A choice that was not timed nearby is charged ten times the best.
 
-- **unseen scenario**: the machine was held out, and the scenario too. A user's scene is none of ours, so that this is the figure that counts.
-- **seen scenario**: the machine was held out alone. **least to largest**: of the machine that was served best and of the one that was served worst; of
-  the held-out reports where all are of one machine.
-- **one thread**, **several**: the same two figures on reports in which no algorithm ran on several threads, and on the others.
-- **by means**: all reports, judged by the mean over the frames of a timing in place of their median. It holds the frames in which an incremental algorithm makes
-  again what it keeps, and those that another program interrupted.
-- **crossovers off by**: octaves between the measured crossover of two algorithms in the scenario `uniform` and where their predicted costs
-  cross, the median; one octave is a factor of two in objects. Where they do not cross in the measured sizes, the
-  distance to the end of these, a lower bound. Only for what predicts costs. A crossover of two algorithms that cost nearly the same is vague and
-  harmless: the regret tells what it costs.
-- **over 10 %**: share of the points, in scenarios seen, at which the choice cost a tenth more than the best, or worse.
-- **floor** is what is lost by chance: whoever was best in the same cell of another run of the same machine. **another run's full sweep** chooses by the
-  costs that were measured in that run. Both are of as many pairs of runs as they say, and no strategy can be told from another by less.
+- **unseen scenario**: the host and the scenario were held out. A user's scene is none of ours: this is the number that counts.
+- **seen scenario**: only the host was held out. **least to largest**: of the hosts.
+- **one thread**, **several**: seen scenarios, by the threads of the report.
+- **by means**: judged by the mean over frames instead of the median, which includes rebuilds and interruptions.
+- **crossovers off by**: median distance between measured and predicted crossovers in `uniform`; an octave is a factor of two in objects.
+- **over 10 %**: share of the cells in which the choice cost a tenth more than the best, or worse.
+- **floor**: the best of the same cell in a repeated run. **another run's full sweep** chooses by the costs of that run. Smaller differences say
+  nothing.
 ";
 
-/// What the strategies are, below the scores.
+/// What the strategies are.
 const STRATEGIES: &str = "
-`physics + load` is what `predict` does; `physics` the same without the residual. `random forest` predicts each method's time from
-load and hardware parameters and knows no physics. `direct regression` is the paper's: the position of each crossover as a power law of
-hardware parameters, and a choice by the number of objects alone. Notes say how many of its crossovers are means: there were no more
-machines with that crossing than parameters to regress it on. `frozen constants (64)` and `(1000)` switch from brute force at the number of
-objects that engines have written down (64 colliders in nexus, 1000 bodies in mujoco_warp), `default machine` at the measured thresholds of
-the first report in the training, whatever the machine; `nearest machine` takes the measured costs of the machine of the training with the most
-similar parameters. `full sweep` has measured the held-out machine itself, and is judged by those same timings; of an unseen scenario it has measured
-all the others on that machine, so that what it still loses there is what a load does not tell of a scene.
+`physics + load` is what `predict` does, `physics` the same without the residual. `random forest` predicts times from load and parameters.
+`nearest machine` takes the measured costs of the most similar host. `direct regression` is the paper's: crossovers as power laws of parameters, and a
+choice by the number of objects. `frozen constants` switch from brute force at 64 (nexus) or 1000 objects (mujoco_warp). `single best` is always the
+same algorithm. `full sweep` has measured the held-out host itself and is judged by the same timings, in an unseen scenario by the others.
 ";
 
-/// The model card as a page of Markdown, with the notes of the training.
+/// Returns the model card as a page of Markdown, with the notes of the training.
 #[must_use]
 pub fn page(model: &Model, training: &Training, notes: &[String]) -> String {
-    let mut text = format!("# The model {}\n\nMade by `sapwise train`; this page is generated with it.\n", model.name);
-    if model.simulated {
-        text.push_str(SIMULATED);
-    }
-    text.push_str(USE);
+    let mut text = format!("# The model {}\n\nGenerated by `sapwise train --card`.\n{USE}", model.name);
     let on_gpus: Vec<&MethodModel> = model.methods.iter().filter(|m| m.backend == BackendClass::Gpu).collect();
     text.push_str(&gpus(&on_gpus));
     text.push_str("\n## Validation\n\n");
@@ -90,9 +66,7 @@ pub fn page(model: &Model, training: &Training, notes: &[String]) -> String {
         text.push_str(STRATEGIES);
     }
     text.push_str(&trained_on(training));
-    text.push_str(
-        "\n## Ranges\n\nA machine outside is extrapolated, and `predict` says so. It looks at each parameter by itself.\n\n",
-    );
+    text.push_str("\n## Ranges\n\n`predict` warns when a parameter of a machine lies outside.\n\n");
     let mut rows = vec![["parameter", "lowest", "highest"].map(str::to_owned).to_vec()];
     for range in &model.ranges {
         let name = range.parameter.to_string();
@@ -109,28 +83,31 @@ pub fn page(model: &Model, training: &Training, notes: &[String]) -> String {
     text
 }
 
-/// What the model knows of GPUs.
+/// Returns what the model knows of GPUs.
 fn gpus(methods: &[&MethodModel]) -> String {
     if methods.is_empty() {
-        return format!(" {NO_GPUS}");
+        return NO_GPUS.to_owned();
     }
     let mut kinds: Vec<String> = methods.iter().flat_map(|m| &m.gpu_kinds).map(ToString::to_string).collect();
     kinds.sort_unstable();
     kinds.dedup();
     let most = methods.iter().map(|m| m.max_threads).max().unwrap_or(1);
-    format!("\n{GPUS}\nKinds of GPU in the training: {}; at most {most} together.\n", kinds.join(", "))
+    format!("{GPUS}\nKinds of GPU in the training: {}; at most {most} together.\n", kinds.join(", "))
 }
 
-/// The reports behind a model, or their counts.
+/// Returns a table of how many reports of each host, or of each label, are behind a model.
 fn trained_on(training: &Training) -> String {
-    let mut rows = vec![["report", "host", "label"].map(str::to_owned).to_vec()];
-    rows.extend(training.trained_on.iter().map(|r| vec![r.file.clone(), r.host.clone(), kind(r.label).to_owned()]));
-    if !training.trained_on_counts.is_empty() {
-        rows = vec![["reports", "physical machines", "label"].map(str::to_owned).to_vec()];
-        let counts = training.trained_on_counts.iter();
-        rows.extend(
-            counts.map(|c| vec![c.reports.to_string(), c.physical_machines.to_string(), kind(c.label).to_owned()]),
-        );
+    let mut rows = vec![["host", "reports", "label"].map(str::to_owned).to_vec()];
+    let mut hosts: BTreeMap<(&str, &str), usize> = BTreeMap::new();
+    for report in &training.trained_on {
+        // The folder, which the user named after the host.
+        let host = report.file.split_once('/').map_or(&report.host[..], |(folder, _)| folder);
+        *hosts.entry((host, kind(report.label))).or_default() += 1;
+    }
+    rows.extend(hosts.iter().map(|((host, label), reports)| vec![(*host).to_owned(), reports.to_string(), (*label).to_owned()]));
+    for counted in &training.trained_on_counts {
+        let hosts = count(counted.physical_machines, "host");
+        rows.push(vec![hosts, counted.reports.to_string(), kind(counted.label).to_owned()]);
     }
     format!("\n## Trained on\n\n{}", markdown(&rows))
 }
@@ -139,16 +116,16 @@ fn percent(share: f64) -> String {
     format!("{:.1} %", share * 100.0)
 }
 
-/// How far predictions may be off.
+/// Returns how far predictions may be off.
 fn intervals(validation: &Validation) -> String {
     let Some(c) = validation.coverage else {
-        return "None are claimed: fewer than two machines were held out, so that nobody knows how far a prediction may be off.\n".to_owned();
+        return "None: fewer than two hosts were held out.\n".to_owned();
     };
     format!(
-        "On {} held out, nine of ten times lay within a factor of {:.2} of their prediction, and nine of ten ratios of the two fastest algorithms of a \
-         load within {:.2}: the intervals of predicted crossovers are made of the latter. By the factor that the other machines tell, {} of the times of a \
-         machine and {} of the ratios lay within.\n",
-        count(c.physical_machines, "physical machine"),
+        "On {} held out, nine of ten times lay within a factor of {:.2} of their prediction, and nine of ten ratios of the two fastest algorithms \
+         within {:.2}, which makes the intervals of predicted crossovers. The factors of the other hosts held for {} of the times of a host and for {} \
+         of the ratios.\n",
+        count(c.physical_machines, "host"),
         c.times_90_ln.exp(),
         c.ratios_90_ln.exp(),
         percent(c.times),
@@ -156,18 +133,12 @@ fn intervals(validation: &Validation) -> String {
     )
 }
 
-/// Over all sizes and, in parentheses, as games have them.
+/// Over all sizes and, in parentheses, weighted as in games.
 fn regrets(regrets: Option<Regrets>) -> String {
     regrets.map_or_else(|| "-".to_owned(), |r| format!("{:.1} % ({:.1})", 100.0 * r.all, 100.0 * r.in_games))
 }
 
-/// A [`Split`] as three cells.
-fn split(split: Option<&Split>) -> [String; 3] {
-    let of = |which: fn(&Split) -> Option<Regrets>| regrets(split.and_then(which));
-    [of(|s| Some(s.all)), of(|s| s.one_thread), of(|s| s.several_threads)]
-}
-
-/// What was held out, and the scores as a table that `draw` draws.
+/// Returns what was held out, and the scores as a table that `draw` draws.
 pub fn scores(validation: &Validation, draw: impl Fn(&[Vec<String>]) -> String) -> String {
     let Validation { held_out, physical_machines, cpu_models, profiles, methods, floor, .. } = validation;
     let of_models = format!("{} of {}", count(*physical_machines, "physical machine"), count(*cpu_models, "CPU model"));
@@ -179,12 +150,10 @@ pub fn scores(validation: &Validation, draw: impl Fn(&[Vec<String>]) -> String) 
     let head = [
         "strategy",
         "unseen scenario",
-        "unseen, one thread",
-        "unseen, several",
         "seen scenario",
         "least to largest",
-        "seen, one thread",
-        "seen, several",
+        "one thread",
+        "several",
         "by means",
         "crossovers off by",
         "over 10 %",
@@ -192,33 +161,33 @@ pub fn scores(validation: &Validation, draw: impl Fn(&[Vec<String>]) -> String) 
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for m in methods {
         let seen = Regrets { all: m.mean_regret, in_games: m.mean_regret_in_games.unwrap_or_default() };
-        let octaves =
-            m.crossing_error_octaves.map_or_else(|| "-".to_owned(), |octaves| format!("{octaves:.2} octaves"));
-        let range =
-            m.regret_range().map_or_else(|| "-".to_owned(), |[a, b]| format!("{:.1} to {:.1}", 100.0 * a, 100.0 * b));
-        let mut row = vec![m.name.clone()];
-        row.extend(split(m.unseen_scenario.as_ref()));
-        row.extend([
+        let octaves = m.crossing_error_octaves.map(|octaves| format!("{octaves:.2} octaves"));
+        let range = m.regret_range().map(|[a, b]| format!("{:.1} to {:.1}", 100.0 * a, 100.0 * b));
+        let or_none = |cell: Option<String>| cell.unwrap_or_else(|| "-".to_owned());
+        rows.push(vec![
+            m.name.clone(),
+            regrets(m.unseen_scenario.map(|s| s.all)),
             regrets(Some(seen)),
-            range,
+            or_none(range),
             regrets(m.one_thread),
             regrets(m.several_threads),
             regrets(m.by_means),
+            or_none(octaves),
+            percent(m.share_over_10_percent),
         ]);
-        row.extend([octaves, percent(m.share_over_10_percent)]);
-        rows.push(row);
     }
-    if let Some(f) = floor {
+    for f in floor {
         for (name, of) in [("floor", &f.cells), ("another run's full sweep", &f.full_sweep)] {
-            let [all, one, several] = split(Some(of));
+            let Split { all, one_thread, several_threads } = of;
             let name = format!("{name}, {}", count(f.pairs, "pair"));
-            rows.push([&name, "-", "-", "-", &all, "-", &one, &several, "-", "-", "-"].map(str::to_owned).to_vec());
+            let [all, one, several] = [Some(*all), *one_thread, *several_threads].map(regrets);
+            rows.push([&name, "-", &all, "-", &one, &several, "-", "-", "-"].map(str::to_owned).to_vec());
         }
     }
     format!("{data}; each {held_out} held out in turn.{doubt}\n\n{}", draw(&rows))
 }
 
-/// Rows as a Markdown table, the first its head.
+/// Draws rows as a Markdown table, the first its head.
 pub fn markdown(rows: &[Vec<String>]) -> String {
     let mut text = String::new();
     for (k, row) in rows.iter().enumerate() {
@@ -237,7 +206,7 @@ mod tests {
     use crate::text::columns;
 
     #[test]
-    fn scores_tell_what_they_do_not_say() {
+    fn scores_are_a_table_that_says_how_little_one_machine_shows() {
         let score = |name: &str, closed_gap| MethodScore {
             name: name.to_owned(),
             mean_regret: 0.05,
@@ -264,27 +233,26 @@ mod tests {
             text.contains("1 physical machine of 1 CPU model in 2 profiles") && text.contains("says little"),
             "{text}"
         );
-        let row = "| physics | - | - | - | 5.0 % (4.0) | 0.4 to 30.0 | - | - | - | 0.25 octaves | 0.0 % |";
-        assert!(text.contains(row) && text.contains("| floor, 1 pair | - | - | - | 2.0 % (1.0) |"), "{text}");
+        let row = "| physics | - | 5.0 % (4.0) | 0.4 to 30.0 | - | - | - | 0.25 octaves | 0.0 % |";
+        assert!(text.contains(row) && text.contains("| floor, 1 pair | - | 2.0 % (1.0) |"), "{text}");
         validation.methods.clear();
         assert_eq!(scores(&validation, columns), "1 physical machine of 1 CPU model in 2 profiles; not validated.\n");
-        assert!(intervals(&validation).starts_with("None are claimed"));
     }
 
     #[test]
-    fn figures_have_units_and_intervals_say_what_they_are_made_of() {
+    fn ranges_have_units_and_intervals_a_source() {
         let mut model = Model::built_in().unwrap();
         // A range of its own: that of the built-in model changes with each host in its training.
         let cache = model.ranges.iter_mut().find(|r| r.parameter == "cache_llc_bytes").unwrap();
         (cache.min, cache.max) = (32.0 * 1024.0 * 1024.0, 260.0 * 1024.0 * 1024.0);
         let text = page(&model, &Training::default(), &["a note".to_owned()]);
         assert!(text.contains("| cache_llc_bytes | 32 MiB | 260 MiB |") && text.contains("GHz"), "{text}");
-        assert!(text.contains("None are claimed") && text.ends_with("- a note\n"), "{text}");
+        assert!(text.contains("None: fewer than two") && text.ends_with("- a note\n"), "{text}");
         let coverage =
             crate::Coverage { physical_machines: 3, times_90_ln: 0.5, times: 0.91, ratios_90_ln: 0.2, ratios: 0.88 };
         let told = intervals(&Validation { coverage: Some(coverage), ..Validation::default() });
         assert!(
-            told.contains("3 physical machines") && told.contains("within 1.22") && told.contains("88.0 %"),
+            told.contains("3 hosts") && told.contains("within 1.22") && told.contains("88.0 %"),
             "{told}"
         );
     }

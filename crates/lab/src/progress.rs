@@ -1,34 +1,32 @@
-//! How far long work has come, and whether the user wants it to end.
+//! Progress of long work, and whether the user wants it to stop.
 
 /// The user asked to stop before the end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("interrupted before the end; there is no result")]
 pub struct Interrupted;
 
-/// Where long work tells how far it has come. A program draws a bar of it; [`Silent`] draws nothing.
-///
-/// Work that consists of several parts starts each with its own number of steps.
+/// Receives the progress of long work. Work of several parts starts each with its own number of steps. [`Silent`] ignores all of it.
 pub trait Progress: Sync {
     /// Begins a part of `steps` steps.
     fn start(&self, steps: u64);
 
-    /// `steps` more steps of the part are done. Called from several threads.
+    /// Adds `steps` finished steps of the part. Called from several threads.
     fn advance(&self, steps: u64);
 
-    /// Says what is being done.
+    /// Says what the work is doing.
     fn message(&self, text: &str);
 
-    /// Tells what the user should know and what stops nothing. Called from several threads.
+    /// Warns the user; the work goes on. Called from several threads.
     fn warn(&self, text: &str);
 
-    /// Asked between steps whether to go on.
+    /// Asks between steps whether to go on.
     ///
     /// # Errors
     /// When the user asked to stop.
     fn check(&self) -> Result<(), Interrupted>;
 }
 
-/// Tells nobody, and is never interrupted.
+/// Ignores all progress and is never interrupted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Silent;
 

@@ -5,7 +5,7 @@ use crate::training::Training;
 use sapwise::json::{self, Error};
 use serde_json::Value;
 
-/// Returns file names and texts of the JSON Schemas of tunings, models and reports.
+/// Returns the file names and texts of the JSON Schemas of tunings, models with their training, and reports.
 ///
 /// # Errors
 /// When a schema can't be written.
@@ -18,7 +18,7 @@ pub fn schemas() -> Result<Vec<(String, String)>, Error> {
     Ok(schemas)
 }
 
-/// Puts the schema of the notes of a training into that of the predicting part of a model.
+/// Puts the schema of the training into that of a model.
 fn with_training(model: &str) -> Result<String, Error> {
     let mut model: Value = serde_json::from_str(model).map_err(Error::Write)?;
     let mut training = schemars::schema_for!(Training).to_value();

@@ -1,7 +1,7 @@
-//! From reports to a model that says how well it did.
+//! A model trained on reports and validated on held-out machines.
 
-use crate::data::{Evidence, Profile, Selection};
-use crate::evaluate::{HeldOut, Partition, folded, validate};
+use crate::data::{Profile, Selection};
+use crate::evaluate::{HeldOut, Partition, validate};
 use crate::fit::{Designs, TrainingSet, model};
 use crate::progress::Progress;
 use crate::report::Label;
@@ -10,30 +10,30 @@ use anyhow::{Result, bail};
 use sapwise::Model;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Reports that a training lists; of more it keeps the counts. One takes 130 bytes, and the built-in model is part of the library.
+/// Most reports that a training lists; it counts more. One takes 130 bytes, and the built-in model is part of the library.
 const MOST_LISTED: usize = 400;
 
-/// A model and what has to be said about it.
+/// A model and how well it did.
 #[derive(Debug, Clone)]
 pub struct Trained {
-    /// What predicts.
+    /// The model, fitted to all reports.
     pub model: Model,
-    /// What it was trained on, and how well it did on what it had not seen.
+    /// What it was trained on, and how well models of its kind did on held-out machines.
     pub training: Training,
-    /// In sentences, what was left out and why, and what the validation does not say.
+    /// Sentences on what was left out and why, and on what the validation does not say.
     pub notes: Vec<String>,
-    /// What a picture shows of the validation.
+    /// Regrets and crossovers of what was held out.
     pub held_out: HeldOut,
 }
 
-/// The model fitted to all profiles but those that are held out together with that of `file`, and what these are, in words.
+/// Fits a model to all profiles but those that are held out together with that of `file`, and returns it with what these are.
 ///
 /// # Errors
-/// When no model can be fitted to the others, or there are none.
+/// When there are no others, or no model can be fitted to them.
 pub fn without(profiles: &[Profile], file: &str) -> Result<(Model, String)> {
     let partition = Partition::new(profiles);
     let mut chosen = vec![true; profiles.len()];
-    // Of one machine alone a profile is in a fold of its vectors and in one of its threads; both would tell of it.
+    // A profile of the only machine is in two folds: that of its SIMD level and that of its threads.
     let own = |fold: &&Vec<usize>| fold.iter().any(|&k| profiles[k].file == file);
     partition.folds.iter().filter(own).flatten().for_each(|&k| chosen[k] = false);
     if !chosen.contains(&true) {
@@ -43,44 +43,35 @@ pub fn without(profiles: &[Profile], file: &str) -> Result<(Model, String)> {
     Ok((model, partition.held_out))
 }
 
-/// Fits the model called `name` to what was selected of reports, and validates it.
-///
-/// Reports of the other evidence, those without timings, of unoptimised builds and repeated ones are left out by the selection, and so are
-/// timings of revisions that are not the newest of their method. The file names stand in the training; the order of the reports matters for
-/// one baseline only, which takes the first one left in training for the default machine.
+/// Fits the model called `name` to the selected reports, and validates it.
 ///
 /// # Errors
-/// When no report can be used, with the reason for each and what to do; when no method can be fitted; when the user asked to stop.
+/// When no report can be used, with the reasons and what to do; when no method can be fitted; when the user asked to stop.
 pub fn train(selection: Selection, name: &str, progress: &dyn Progress) -> Result<Trained> {
-    let evidence = selection.evidence();
     let (profiles, mut notes) = selection.finish();
     if profiles.is_empty() {
         let why = if notes.is_empty() { "none was given".to_owned() } else { notes.join("; ") };
-        let next = match evidence {
-            Evidence::Real => "measure one with `sapwise probe --out R.json` of a release build",
-            Evidence::Simulated => "make some with `sapwise simulate`",
-        };
-        bail!("no report can be trained on: {why}; {next}");
+        bail!("no report can be trained on: {why}; measure one with `sapwise probe --out R.json` of a release build");
     }
     let designs = Designs::new(&profiles);
     let (model, left_out) = model(&profiles, &designs, TrainingSet::of(&vec![true; profiles.len()]), name)?;
     notes.extend(designs.notes.iter().cloned());
     notes.extend(left_out);
     let validated = validate(&profiles, &designs, &Partition::new(&profiles), progress)?;
-    notes.extend(validated.notes);
+    notes.extend(validated.notes.into_iter().filter(|note| !notes.contains(note)).collect::<Vec<_>>());
     let model = model.with_intervals(validated.validation.coverage.map(|c| c.ratios_90_ln));
     let training = Training { validation: validated.validation, ..behind(&profiles) };
-    Ok(Trained { model, training, notes: folded(notes), held_out: validated.held_out })
+    Ok(Trained { model, training, notes, held_out: validated.held_out })
 }
 
-/// What a training says of the reports behind it, before any validation.
+/// Lists or counts the reports behind a training, without its validation.
 fn behind(profiles: &[Profile]) -> Training {
     if profiles.len() <= MOST_LISTED {
         let report =
             |p: &Profile| TrainingReport { file: p.file.clone(), host: p.machine().to_owned(), label: p.label };
         return Training { trained_on: profiles.iter().map(report).collect(), ..Training::default() };
     }
-    // By the name of the label, since labels have no order.
+    // Labels have no order, their names do.
     let mut kinds: BTreeMap<String, (Label, usize, BTreeSet<&str>)> = BTreeMap::new();
     for profile in profiles {
         let kind = kinds.entry(format!("{:?}", profile.label)).or_insert((profile.label, 0, BTreeSet::new()));
@@ -111,7 +102,7 @@ mod tests {
     }
 
     fn of(reports: &[(String, Report)]) -> Selection {
-        Selection::of(reports, Evidence::Real)
+        Selection::of(reports)
     }
 
     #[test]

@@ -7,8 +7,8 @@ use std::path::Path;
 
 #[test]
 fn the_model_without_a_machine_loses_less_on_it_than_brute_force_does() {
-    let datasets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/earlier");
-    let text = example::leave_one_out(&datasets, "amd-epyc-zen3-2c-full--2026-11-22.json").unwrap();
+    let datasets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets");
+    let text = example::leave_one_out(&datasets, "amd-epyc-zen3-2c/full.json").unwrap();
     let regret = |name: &str| -> f64 {
         let line = text.lines().find(|l| l.starts_with(name)).unwrap();
         line[name.len()..].split_whitespace().next().unwrap().parse().unwrap()

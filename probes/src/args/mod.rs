@@ -103,13 +103,9 @@ pub(crate) struct Predict {
 Example:
   sapwise train datasets/ --out mine.json --card mine.md")]
 pub(crate) struct Train {
-    /// Reports, or folders whose *.json files are reports.
+    /// Reports, or folders: all *.json files in them are reports.
     #[arg(required = true, value_name = "R.json")]
     pub(crate) reports: Vec<PathBuf>,
-    /// Train on simulated reports only. Without this option simulated reports are left out, so that the two are never
-    /// mixed. `predict` warns of a model that was trained on simulated reports.
-    #[arg(long)]
-    pub(crate) simulated: bool,
     /// Where the model goes.
     #[arg(long, value_name = "M.json")]
     pub(crate) out: PathBuf,

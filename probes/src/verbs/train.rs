@@ -8,13 +8,13 @@ use crate::terminal::Terminal;
 use crate::{interrupt, output, outputs, shell};
 use rayon::prelude::*;
 use sapwise::Model;
-use sapwise_lab::data::{Evidence, Selection, read_report, report_files};
+use sapwise_lab::data::{Selection, read_report, report_files};
 use sapwise_lab::write::write_text;
 use sapwise_lab::{Trained, Training, Validation, model_card, train, write_model};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Reports that are in memory at the same time: a full one has a megabyte, ten thousand have ten gigabytes.
+/// Reports in memory at the same time. A full one takes some megabytes.
 const AT_A_TIME: usize = 64;
 
 /// The answer for machines.
@@ -28,13 +28,12 @@ struct Answer<'a> {
 
 pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     let name = name(arguments)?;
-    let evidence = if arguments.simulated { Evidence::Simulated } else { Evidence::Real };
     let reports = report_files(&arguments.reports)?;
     let outputs: Vec<_> = [Some(&arguments.out), arguments.card.as_ref()].into_iter().flatten().collect();
     outputs::check(&reports, &outputs)?;
     interrupt::listen()?;
     let progress = Progress::new(reports.len() as u64);
-    let (selection, doubtful) = select(&reports, evidence, &progress)?;
+    let (selection, doubtful) = select(&reports, &progress)?;
     let Trained { model, training, mut notes, .. } = train(selection, &name, &progress)?;
     drop(progress);
     notes.extend(doubtful.notes(&arguments.reports));
@@ -51,12 +50,12 @@ pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Reports whose figures are doubtful, with their names.
+/// Doubtful reports.
 #[derive(Default)]
 struct Doubtful(Vec<(PathBuf, Vec<String>)>);
 
 impl Doubtful {
-    /// All doubts about reports that the user named; of those in folders their number.
+    /// Returns all doubts about reports that the user named, and the number of doubtful reports in folders.
     fn notes(&self, named: &[PathBuf]) -> Vec<String> {
         let (own, in_folders): (Vec<_>, Vec<_>) = self.0.iter().partition(|(path, _)| named.contains(path));
         let of = |(path, doubts): &(PathBuf, Vec<String>)| {
@@ -72,16 +71,16 @@ impl Doubtful {
     }
 }
 
-/// Reads the reports on all cores, some at a time, and keeps of each what is trained on.
-fn select(files: &[PathBuf], evidence: Evidence, progress: &Progress) -> anyhow::Result<(Selection, Doubtful)> {
+/// Reads the reports on all cores, some at a time, and keeps what is trained on.
+fn select(files: &[PathBuf], progress: &Progress) -> anyhow::Result<(Selection, Doubtful)> {
     progress.message("reading");
-    let mut selection = Selection::new(evidence);
+    let mut selection = Selection::default();
     let mut doubtful = Doubtful::default();
     for some in files.chunks(AT_A_TIME) {
         interrupt::check()?;
         let read = |file: &PathBuf| {
             let (name, report) = read_report(file, &|text| progress.warn(text))?;
-            Ok((doubts(&report), selection.reduce(&name, &report)))
+            Ok((doubts(&report), Selection::reduce(&name, &report)))
         };
         let reduced: Vec<_> = some.par_iter().map(read).collect::<anyhow::Result<_>>()?;
         for (file, (doubts, reduced)) in some.iter().zip(reduced) {
@@ -95,7 +94,7 @@ fn select(files: &[PathBuf], evidence: Evidence, progress: &Progress) -> anyhow:
     Ok((selection, doubtful))
 }
 
-/// The name that the user gave, or that of the file.
+/// Returns the name that the user gave, or that of the file.
 fn name(arguments: &Train) -> anyhow::Result<String> {
     let stem = || arguments.out.file_stem().map(|s| s.to_string_lossy().into_owned());
     let name = arguments.name.clone().or_else(stem).unwrap_or_default();
@@ -105,10 +104,9 @@ fn name(arguments: &Train) -> anyhow::Result<String> {
     Ok(name)
 }
 
-/// What the columns in the summary mean, in few words.
-const COLUMNS: &str = "Regret is time over the best time, less one; in parentheses with the numbers of objects weighted as games are assumed to \
-have them (log-normal\naround 800). Crossovers off by: the median distance in octaves between measured and predicted crossovers. --card explains \
-every column.\n";
+/// What the columns of the summary mean.
+const COLUMNS: &str = "Regret is time over the best time, less one; in parentheses weighted by how often games are assumed to have that many \
+objects (log-normal\naround 800). Crossovers off by: median distance between measured and predicted crossovers. --card explains every column.\n";
 
 fn summary(model: &Model, training: &Training, notes: &[String], path: &Path, terminal: Terminal) -> String {
     let table = |rows: &[Vec<String>]| terminal.table(rows);

@@ -1,10 +1,10 @@
-//! The parameters by which machines are compared: with each other, and with those of a training.
+//! The parameters by which machines are compared with each other and with those of a training.
 
 use sapwise::hardware::{GpuParameterId, ParameterId};
 use sapwise::model::GPU_PREFIX;
 use sapwise::{GpuHardware, GpuKind, Hardware};
 
-/// Parameters by which the CPU of a machine is compared with those of the training.
+/// Parameters of a machine without its GPUs.
 pub const COMPARED: [ParameterId; 8] = [
     ParameterId::ClockMeasuredGhz,
     ParameterId::SimdLanes,
@@ -16,7 +16,7 @@ pub const COMPARED: [ParameterId; 8] = [
     ParameterId::UsableCores,
 ];
 
-/// The same of a GPU.
+/// Parameters of a GPU.
 pub const COMPARED_OF_GPUS: [GpuParameterId; 10] = [
     GpuParameterId::RoundTripNs,
     GpuParameterId::ReadBackNs,
@@ -30,18 +30,18 @@ pub const COMPARED_OF_GPUS: [GpuParameterId; 10] = [
     GpuParameterId::ArithmeticGflopPerS,
 ];
 
-/// Whether a GPU is no software adapter.
+/// Returns whether a GPU is no software adapter.
 pub(crate) fn is_real(gpu: &GpuHardware) -> bool {
     gpu.gpu.kind != GpuKind::Software
 }
 
-/// The first GPU that is no software adapter.
-fn first_real_gpu(hardware: &Hardware) -> Option<&GpuHardware> {
+/// Returns the first GPU that is no software adapter.
+pub(crate) fn first_real_gpu(hardware: &Hardware) -> Option<&GpuHardware> {
     hardware.gpus.iter().find(|g| is_real(g))
 }
 
-/// A parameter of a machine by the name that it has in a model's ranges. That of a GPU is the one of the first GPU, which is a
-/// discrete one where there is any; software adapters don't count.
+/// Returns a parameter by its name in the ranges of a model. A parameter of GPUs is that of the first real one, which is a discrete GPU if
+/// the machine has any.
 #[must_use]
 pub fn figure(hardware: &Hardware, name: &str) -> Option<f64> {
     match name.strip_prefix(GPU_PREFIX) {

@@ -4,6 +4,7 @@ use crate::progress::Progress;
 use crate::report::{self, Report};
 use crate::training::{StoredModel, read_model_and_skipped};
 use anyhow::{Context, bail};
+use rayon::prelude::*;
 use sapwise::Tuning;
 use sapwise::json::{Format, Schema};
 use std::collections::BTreeSet;
@@ -11,7 +12,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// Files larger than this are refused before they fill the memory. A full report of a machine with 64 threads has 2 MB.
+/// Larger files are refused before they fill the memory. A full report of a machine with 64 threads has 2 MB.
 const LARGEST_BYTES: u64 = 64 << 20;
 
 /// A file of Sapwise, whatever its schema.
@@ -26,7 +27,7 @@ pub enum Document {
     Tuning(Box<Tuning>),
 }
 
-/// Reads a report, model or tuning file. `warn` gets a sentence where a newer version wrote keys that this one does not know.
+/// Reads a report, model or tuning file. `warn` gets a sentence when a newer version wrote keys that this one does not know.
 ///
 /// # Errors
 /// Names the file, and the line and column or the figure that is wrong.
@@ -56,7 +57,7 @@ pub fn read_document(path: &Path, warn: &dyn Fn(&str)) -> anyhow::Result<Documen
     Ok(document)
 }
 
-/// Which keys of a newer version are ignored. A key that stands in each of many points is told once.
+/// Says which keys of a newer version are ignored. A key of each of many points is named once.
 fn ignored(path: &Path, schema: &Schema, skipped: &[String]) -> String {
     let keys: BTreeSet<String> = skipped.iter().map(|place| without_indices(place)).collect();
     let keys: Vec<&str> = keys.iter().map(String::as_str).collect();
@@ -67,7 +68,7 @@ fn ignored(path: &Path, schema: &Schema, skipped: &[String]) -> String {
     )
 }
 
-/// A place in a file for all elements of its lists: `points[].load.depth` for `points[3].load.depth`.
+/// Turns a place in a file into that of all elements of its lists: `points[3].load.depth` into `points[].load.depth`.
 fn without_indices(place: &str) -> String {
     let mut parts = place.split('[');
     let mut text = parts.next().unwrap_or_default().to_owned();
@@ -78,13 +79,18 @@ fn without_indices(place: &str) -> String {
     text
 }
 
-/// The reports with their file names, of files and of the `*.json` files of folders, in the order of their names.
+/// Reads the reports in files and folders on all cores, with the name of each as [`read_report`] gives it.
 ///
 /// # Errors
-/// As [`report_files`], [`refuse_twice`] and [`read_report`]; when the user asked to stop.
+/// As [`report_files`] and [`read_report`]; when a file is given twice, which would count as two measurements; when the user asked to
+/// stop.
 pub fn read_reports(paths: &[PathBuf], progress: &dyn Progress) -> anyhow::Result<Vec<(String, Report)>> {
     let files = report_files(paths)?;
-    refuse_twice(&files)?;
+    let mut seen = BTreeSet::new();
+    // What can't be found is an error where it is read.
+    if let Some(file) = files.iter().find(|file| file.canonicalize().is_ok_and(|place| !seen.insert(place))) {
+        bail!("{} is given twice; name each file once", file.display());
+    }
     progress.start(files.len() as u64);
     progress.message("reading");
     let read = |file: &PathBuf| {
@@ -93,10 +99,10 @@ pub fn read_reports(paths: &[PathBuf], progress: &dyn Progress) -> anyhow::Resul
         progress.advance(1);
         report
     };
-    files.iter().map(read).collect()
+    files.par_iter().map(read).collect()
 }
 
-/// Files, and the `*.json` files of folders, in the order of their names.
+/// Lists files, and the `*.json` files of folders and of the folders within them, in the order of their paths.
 ///
 /// # Errors
 /// When a folder can't be read or holds no such file.
@@ -104,10 +110,12 @@ pub fn report_files(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
     let mut files: Vec<PathBuf> = Vec::new();
     for path in paths {
         if path.is_dir() {
-            let found = json_files(path)?;
+            let mut found = Vec::new();
+            json_files(path, &mut found)?;
             if found.is_empty() {
                 bail!("the folder {} holds no *.json file; make one with `sapwise probe --out R.json`", path.display());
             }
+            found.sort_unstable();
             files.extend(found);
         } else {
             files.push(path.clone());
@@ -116,47 +124,37 @@ pub fn report_files(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Refuses a file that is given twice, under whatever name: it agrees with itself, and would count for two measurements.
-///
-/// # Errors
-/// Names the file.
-pub fn refuse_twice(files: &[PathBuf]) -> anyhow::Result<()> {
-    let mut seen = BTreeSet::new();
-    // What can't be found is told where it is read.
-    let twice = files.iter().find(|file| file.canonicalize().is_ok_and(|place| !seen.insert(place)));
-    twice.map_or(Ok(()), |file| bail!("{} is given twice; name each file once", file.display()))
+/// Adds the `*.json` files of a folder and of the folders within it. Links to folders are not followed: they may lead back.
+fn json_files(folder: &Path, files: &mut Vec<PathBuf>) -> anyhow::Result<()> {
+    let unreadable = || format!("the folder {} can't be read", folder.display());
+    for entry in std::fs::read_dir(folder).with_context(unreadable)? {
+        let entry = entry.with_context(unreadable)?;
+        let path = entry.path();
+        if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+            json_files(&path, files)?;
+        } else if path.extension().is_some_and(|e| e == "json") && path.is_file() {
+            files.push(path);
+        }
+    }
+    Ok(())
 }
 
-/// A report with the name of its file. `warn` is that of [`read_document`].
+/// Reads a report, with its name: that of its folder, which names the host, and of its file, as in `amd-epyc-zen3-2c/full.json`.
+/// `warn` is that of [`read_document`].
 ///
 /// # Errors
 /// As [`read_document`]; when the file is no report.
 pub fn read_report(file: &Path, warn: &dyn Fn(&str)) -> anyhow::Result<(String, Report)> {
     match read_document(file, warn)? {
-        Document::Report(report) => Ok((file_name(file), *report)),
+        Document::Report(report) => Ok((name(file), *report)),
         _ => bail!("{} is no report; only what `sapwise probe` wrote is taken here", file.display()),
     }
 }
 
-/// The `*.json` files of a folder, in the order of their names.
-///
-/// # Errors
-/// When the folder can't be read.
-pub fn json_files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
-    let unreadable = || format!("the folder {} can't be read", folder.display());
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(folder).with_context(unreadable)? {
-        let path = entry.with_context(unreadable)?.path();
-        if path.extension().is_some_and(|e| e == "json") && path.is_file() {
-            files.push(path);
-        }
-    }
-    files.sort_unstable();
-    Ok(files)
-}
-
-fn file_name(path: &Path) -> String {
-    path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned())
+fn name(path: &Path) -> String {
+    let last = |path: Option<&Path>| path.and_then(Path::file_name).map(|n| n.to_string_lossy().into_owned());
+    let file = last(Some(path)).unwrap_or_default();
+    last(path.parent()).map_or(file.clone(), |folder| format!("{folder}/{file}"))
 }
 
 /// Reads a text file of ours.
@@ -170,8 +168,7 @@ pub fn read_text(path: &Path) -> anyhow::Result<String> {
         bail!("{shown} is a folder; name the files in it");
     }
     let mut bytes = Vec::new();
-    // One byte beyond the limit tells a file that is too large from one that just fits; the length in the metadata can't
-    // be trusted for pipes and devices.
+    // One byte beyond the limit shows that a file is too large. The length in the metadata is wrong for pipes and devices.
     file.take(LARGEST_BYTES + 1).read_to_end(&mut bytes).with_context(|| format!("{shown} can't be read"))?;
     if bytes.len() as u64 > LARGEST_BYTES {
         bail!("{shown} is larger than {} MiB, which no file of ours is", LARGEST_BYTES >> 20);
@@ -181,4 +178,31 @@ pub fn read_text(path: &Path) -> anyhow::Result<String> {
         let line = e.as_bytes()[..at].iter().filter(|&&b| b == b'\n').count() + 1;
         anyhow::anyhow!("{shown} is no text: line {line} is not UTF-8 from byte {at} of the file on")
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn folders_are_searched_for_json_files_only() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir_all(folder.path().join("b/deep")).unwrap();
+        for file in ["b/full.json", "b/host.md", "b/deep/1t.json", "a.json", "z.csv"] {
+            std::fs::write(folder.path().join(file), "{}").unwrap();
+        }
+        let found = report_files(&[folder.path().to_owned()]).unwrap();
+        let expected = ["a.json", "b/deep/1t.json", "b/full.json"].map(|file| folder.path().join(file));
+        assert_eq!(found, expected);
+        assert!(report_files(&[folder.path().join("b/none")]).is_ok_and(|files| files.len() == 1));
+        std::fs::remove_dir_all(folder.path().join("b/deep")).unwrap();
+        std::fs::remove_file(folder.path().join("b/full.json")).unwrap();
+        assert!(report_files(&[folder.path().join("b")]).unwrap_err().to_string().contains("no *.json file"));
+    }
+
+    #[test]
+    fn a_report_is_named_by_its_folder_and_file() {
+        let names = ["datasets/a/full.json", "full.json", "./full.json", "../full.json"].map(|path| name(path.as_ref()));
+        assert_eq!(names, ["a/full.json", "full.json", "full.json", "full.json"]);
+    }
 }

@@ -1,4 +1,4 @@
-//! What is taken from reports: read from files, reduced to profiles, and selected.
+//! Reports, read from files, reduced to profiles, and selected for training.
 
 mod compared;
 pub mod files;
@@ -7,8 +7,7 @@ mod selection;
 
 pub(crate) use compared::is_real;
 pub use compared::{COMPARED, COMPARED_OF_GPUS, figure};
-pub use files::{
-    Document, json_files, read_document, read_report, read_reports, read_text, refuse_twice, report_files,
-};
+pub(crate) use compared::{first_real_gpu, is_real};
+pub use files::{Document, read_document, read_report, read_reports, read_text, report_files};
 pub use profile::{Profile, Spot, host, is_sound, machines, usual_scenario};
-pub use selection::{Evidence, LeftOut, Selection, usable};
+pub use selection::{LeftOut, Selection};

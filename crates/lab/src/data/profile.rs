@@ -1,4 +1,4 @@
-//! What training keeps of a report: the hardware, and the median of each algorithm at each point.
+//! A report as training sees it: the hardware, and the median of each algorithm at each point.
 
 use crate::report::{Label, Point, Report, Timed, Timing};
 use crate::sweep::median;
@@ -9,15 +9,15 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 /// A report without its samples, of which thousands fit into memory.
 #[derive(Debug, Clone)]
 pub struct Profile {
-    /// File name without folders.
+    /// Name of the report, as [`read_report`](super::read_report) gives it.
     pub file: String,
     /// What kind of evidence it is.
     pub label: Label,
     /// The host that it was measured on.
     pub host: String,
-    /// How the machine was restricted, in words: the same for two runs that repeat each other.
+    /// How the machine was restricted, the same for two runs that repeat each other.
     pub setup: String,
-    /// Without the raw samples of its parameters.
+    /// The hardware, without the raw samples of its parameters.
     pub hardware: Hardware,
     /// The algorithms that were timed.
     pub algorithms: Vec<Timed>,
@@ -30,19 +30,19 @@ pub struct Profile {
 pub struct Spot {
     /// Name of the scenario.
     pub scenario: String,
-    /// The load that an in-line choice would have estimated.
+    /// The load, as a program estimates it from the previous frame.
     pub load: Load,
     /// Position in [`Profile::algorithms`], and the median over the frames in ns.
     pub medians: Vec<(u16, f64)>,
-    /// The mean over the frames of each of these, in the same order: frames in which an incremental algorithm makes again what it keeps count.
+    /// The mean over the frames of each of these, in the same order. It includes the frames in which an incremental algorithm rebuilds.
     pub means: Vec<f64>,
 }
 
-/// A median of fewer samples says nothing about disturbed frames.
+/// Samples that a median needs, so that one disturbed frame does not move it.
 pub(super) const FEWEST_SAMPLES: usize = 3;
 
 impl Profile {
-    /// Keeps of a report what is sound. Timings with an error or too few samples go, and with them points that are empty then.
+    /// Reduces a report. Drops timings with an error or too few samples, and points that are empty then.
     pub fn of(file: &str, report: &Report) -> Self {
         let mut hardware = report.hardware.clone();
         let of_gpus = hardware.gpus.iter_mut().flat_map(|g| &mut g.parameters);
@@ -66,51 +66,51 @@ impl Profile {
         }
     }
 
-    /// The host: all that its reports share is no evidence about another one.
+    /// Returns the host. What all of its reports share is no evidence about another one.
     pub fn machine(&self) -> &str {
         &self.host
     }
 
-    /// The CPU model with its caches, which several hosts may share.
+    /// Returns the CPU model with its caches, which several hosts may share.
     pub fn cpu_model(&self) -> &str {
         &self.hardware.machine.physical_id
     }
 
-    /// An algorithm by its position.
+    /// Returns the algorithm at a position.
     pub fn id(&self, position: u16) -> &AlgorithmId {
         &self.algorithms[usize::from(position)].id
     }
 
-    /// The medians of a point, in ns.
+    /// Returns the medians of a point, in ns.
     #[cfg(test)]
     pub fn medians<'a>(&'a self, spot: &'a Spot) -> impl Iterator<Item = (&'a AlgorithmId, f64)> {
         spot.medians.iter().map(|&(k, ns)| (self.id(k), ns))
     }
 
-    /// These algorithms with the revisions that they were timed in, 0 of one that was not, as a model is asked for them.
+    /// Returns these algorithms with the revisions that were timed, 0 for one that was not, to ask a model for them.
     pub fn with_revisions(&self, ids: &[AlgorithmId]) -> Vec<Entry> {
         let revision = |id: &AlgorithmId| self.algorithms.iter().find(|t| t.id == *id).map_or(0, |t| t.revision);
         ids.iter().map(|id| Entry::new(id.clone(), revision(id))).collect()
     }
 
-    /// The algorithms that were timed anywhere in it.
+    /// Returns the algorithms that were timed at any point.
     pub fn available(&self) -> Vec<AlgorithmId> {
         let mut timed = vec![false; self.algorithms.len()];
         self.points.iter().flat_map(|s| &s.medians).for_each(|m| timed[usize::from(m.0)] = true);
         self.algorithms.iter().zip(timed).filter(|(_, timed)| *timed).map(|(t, _)| t.id.clone()).collect()
     }
 
-    /// The scenario of each point.
+    /// Returns the scenario of each point.
     pub fn scenarios(&self) -> impl Iterator<Item = &str> + Clone {
         self.points.iter().map(|p| p.scenario.as_str())
     }
 
-    /// `uniform` where it has that scenario, else its first one.
+    /// Returns `uniform` if it has that scenario, else its first one.
     pub fn usual_scenario(&self) -> &str {
         usual(self.scenarios())
     }
 
-    /// The loads of a scenario, ascending by objects, each size once.
+    /// Returns the loads of a scenario, ascending by objects, each size once.
     pub fn slice(&self, scenario: &str) -> Vec<Load> {
         let mut loads: Vec<Load> = self.points.iter().filter(|p| p.scenario == scenario).map(|p| p.load).collect();
         loads.sort_by_key(|l| l.objects);
@@ -118,22 +118,22 @@ impl Profile {
         loads
     }
 
-    /// Whether an algorithm ran on several threads.
+    /// Returns whether an algorithm ran on several threads.
     pub fn has_threads(&self) -> bool {
         self.algorithms.iter().any(|t| t.id.threads() > 1)
     }
 
-    /// Whether an algorithm ran on the CPU.
+    /// Returns whether an algorithm ran on the CPU.
     pub fn has_cpu(&self) -> bool {
         self.algorithms.iter().any(|t| t.id.backend().class() == BackendClass::Cpu)
     }
 
-    /// Position of an algorithm among those of the report.
+    /// Returns the position of an algorithm among those of the report.
     pub fn position(&self, id: &AlgorithmId) -> Option<u16> {
         self.algorithms.iter().position(|t| t.id == *id).map(|k| k as u16)
     }
 
-    /// Leaves out the algorithms that `stays` does not admit, with their timings, and the points that are empty then.
+    /// Drops the algorithms that `stays` rejects, with their timings, and the points that are empty then.
     pub fn retain(&mut self, stays: impl Fn(&Timed) -> bool) {
         let kept: Vec<bool> = self.algorithms.iter().map(stays).collect();
         if kept.iter().all(|k| *k) {
@@ -152,7 +152,7 @@ impl Profile {
         self.algorithms.retain(|_| kept.next() == Some(true));
     }
 
-    /// The same for two copies of one measurement, whatever their file names and labels; in all likelihood for no two others.
+    /// Returns a hash of the measurement. Copies under another name or label have the same one.
     pub fn fingerprint(&self) -> u64 {
         let mut hasher = DefaultHasher::new();
         self.machine().hash(&mut hasher);
@@ -168,9 +168,9 @@ impl Profile {
     }
 }
 
-/// What tells hosts apart, as far as hardware parameters do without a serial number: the CPU model with its caches and, of a guest, the clock that the
-/// hypervisor reports in MHz, which is the host's own. Without a hypervisor the system reports whatever the clock is at the moment, so that two
-/// machines of one model count as one.
+/// Identifies a host without a serial number: by its CPU model with its caches and, in a guest, by the clock in MHz that the hypervisor
+/// reports, which is the host's own. Without a hypervisor the reported clock is that of the moment and not used, so that two machines of
+/// one model count as one.
 pub fn host(hardware: &Hardware) -> String {
     let machine = &hardware.machine;
     let clock =
@@ -178,18 +178,17 @@ pub fn host(hardware: &Hardware) -> String {
     clock.map_or_else(|| machine.physical_id.clone(), |ghz| format!("{}-{:.0}", machine.physical_id, 1000.0 * ghz))
 }
 
-/// `uniform` where a report has it, else its first scenario.
+/// Returns `uniform` if a report has that scenario, else its first one.
 pub fn usual_scenario(report: &Report) -> &str {
     usual(report.points.iter().map(|p| p.scenario.as_str()))
 }
 
-/// `uniform` where it is among the names, else the first of them.
 fn usual<'a>(mut names: impl Iterator<Item = &'a str> + Clone) -> &'a str {
     let first = names.clone().next();
     names.find(|n| *n == "uniform").or(first).unwrap_or("uniform")
 }
 
-/// The physical machines of profiles, each once, in order.
+/// Returns the hosts of profiles, each once, in order.
 pub fn machines(profiles: &[Profile]) -> Vec<&str> {
     let mut machines: Vec<&str> = profiles.iter().map(Profile::machine).collect();
     machines.sort_unstable();
@@ -197,7 +196,7 @@ pub fn machines(profiles: &[Profile]) -> Vec<&str> {
     machines
 }
 
-/// Whether a timing has no error and enough samples.
+/// Returns whether a timing has no error and enough samples.
 pub fn is_sound(timing: &Timing) -> bool {
     timing.error.is_none() && timing.samples_ns.len() >= FEWEST_SAMPLES
 }
@@ -213,12 +212,12 @@ impl Spot {
         Self { scenario: point.scenario.clone(), load: point.load, medians, means }
     }
 
-    /// The least median in ns; `None` of none.
+    /// Returns the least median in ns.
     pub fn best(&self) -> Option<f64> {
         self.medians.iter().map(|m| m.1).min_by(f64::total_cmp)
     }
 
-    /// The median of an algorithm by its position.
+    /// Returns the median of the algorithm at a position, in ns.
     pub fn of_position(&self, algorithm: u16) -> Option<f64> {
         self.medians.iter().find(|m| m.0 == algorithm).map(|m| m.1)
     }

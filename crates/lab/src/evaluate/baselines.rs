@@ -1,14 +1,12 @@
-//! Strategies that a prediction has to beat.
+//! The simple strategies that a prediction has to beat.
 
 use super::regret_table::{NOT_TIMED, Strategy};
 use crate::data::{COMPARED, COMPARED_OF_GPUS, Profile, figure};
-use crate::fit::{measured_slice, slice_tuning};
-use anyhow::Result;
 use sapwise::model::GPU_PREFIX;
 use sapwise::{AlgorithmCost, AlgorithmId, BackendClass, Hardware, Tuning, stats};
 
-/// Always the algorithm with the least mean regret over the training profiles, which come with that of each of their algorithms when it is
-/// chosen always; each profile counts the same.
+/// Always chooses the algorithm with the least mean regret over the training profiles, each of which comes with the regret of always
+/// choosing each of its algorithms and counts the same.
 pub(super) fn single_best<'a>(training: &[(&Profile, &[f64])], available: &[AlgorithmId]) -> Strategy<'a> {
     let mean = |id: &AlgorithmId| {
         let of = |(profile, always): &(&Profile, &[f64])| {
@@ -22,13 +20,11 @@ pub(super) fn single_best<'a>(training: &[(&Profile, &[f64])], available: &[Algo
     Box::new(move |_| chosen.clone())
 }
 
-/// Brute force on one thread up to and including `last` objects, `above` on all threads from there on.
+/// Chooses brute force on one thread up to and including `last` objects, and `above` on all threads from there on.
 ///
-/// With 64 and `grid-sap` this is nexus, which has brute force for up to 64 colliders and a tree beyond; strips stand for the
-/// tree, being what is fastest in large scenes here. With 999 and `sap` it is `mujoco_warp`, whose constant of 1000 bodies
-/// parts two kinds of sweep after a brute force that is chosen by a count of filtered pairs, which is not known here; the
-/// constant is taken for the crossover between brute force and sweep. Both run on a GPU there; here both run on the CPU, which
-/// every machine has.
+/// With 64 and `grid-sap` this is nexus: brute force up to 64 colliders, then a tree, for which strips stand as the fastest in large scenes
+/// here. With 999 and `sap` it is `mujoco_warp`, whose constant of 1000 bodies separates two kinds of sweep. Both run on a GPU there, and
+/// on the CPU here, which every machine has.
 pub(super) fn frozen<'a>(last: u32, above: &str, available: &[AlgorithmId]) -> Strategy<'a> {
     let on_cpu = |method: &'_ str| {
         let of = |id: &&AlgorithmId| id.method() == method && id.backend().class() == BackendClass::Cpu;
@@ -39,22 +35,7 @@ pub(super) fn frozen<'a>(last: u32, above: &str, available: &[AlgorithmId]) -> S
     Box::new(move |load| if load.objects <= last { small.clone() } else { large.clone() })
 }
 
-/// The measured thresholds of a profile, by the number of objects alone, whatever the machine. Where they name a GPU and the machine
-/// has none, the same method runs on all of its cores.
-///
-/// # Errors
-/// When that profile has too few timings for thresholds.
-pub(super) fn default_machine<'a>(
-    first: &Profile,
-    costs: &[AlgorithmCost],
-    available: &'a [AlgorithmId],
-) -> Result<Strategy<'a>> {
-    let scenario = first.usual_scenario();
-    let tuning = slice_tuning(costs.to_vec(), scenario, &measured_slice(first, scenario)?)?;
-    Ok(Box::new(move |load| tuning.step(load.objects).and_then(|s| stand_in(&s.algorithm, available))))
-}
-
-/// The cheapest by cost curves; the nearest number of threads stands for one that the machine doesn't have.
+/// Chooses the cheapest by cost curves. The nearest number of threads stands in for one that the machine doesn't have.
 pub fn by_costs(costs: Vec<AlgorithmCost>, available: &[AlgorithmId]) -> Strategy<'_> {
     let tuning = Tuning::from_costs(sapwise::Source::Measured, "", costs, &[]);
     Box::new(move |load| {
@@ -63,23 +44,17 @@ pub fn by_costs(costs: Vec<AlgorithmCost>, available: &[AlgorithmId]) -> Strateg
     })
 }
 
-/// The available algorithm of the same method and class of processor whose number of threads or GPUs is nearest.
+/// Returns the available algorithm of the same method and class of processor whose number of threads or GPUs is nearest.
 pub(super) fn closest(id: &AlgorithmId, available: &[AlgorithmId]) -> Option<AlgorithmId> {
     let distance =
         |other: &&AlgorithmId| (f64::from(other.backend().width()) / f64::from(id.backend().width())).ln().abs();
     let alike = |a: &&AlgorithmId| a.method() == id.method() && a.backend().class() == id.backend().class();
-    // The same GPU first, where there are several of equal number.
+    // The same GPU first.
     let same = available.iter().find(|a| *a == id);
     same.or_else(|| available.iter().filter(alike).min_by(|a, b| distance(a).total_cmp(&distance(b)))).cloned()
 }
 
-/// [`closest`], or the same method on the most threads that are available.
-fn stand_in(id: &AlgorithmId, available: &[AlgorithmId]) -> Option<AlgorithmId> {
-    let of_method = || available.iter().filter(|a| a.method() == id.method()).max_by_key(|a| a.threads()).cloned();
-    closest(id, available).or_else(of_method)
-}
-
-/// What machines are compared by: logarithms of their parameters, worked out once since each is compared with all others.
+/// What machines are compared by: the logarithms of their parameters.
 #[derive(Debug, Clone)]
 pub(super) struct Likeness(Vec<Option<f64>>);
 
@@ -91,7 +66,7 @@ impl Likeness {
     }
 }
 
-/// Position of the nearest machine, by the logarithms of the parameters that both have, over their standard deviation.
+/// Returns the position of the nearest machine, by the logarithms of parameters over their standard deviation.
 pub(super) fn nearest(known: &[&Likeness], own: &Likeness) -> Option<usize> {
     let mut distances = vec![0.0; known.len()];
     for (k, own) in own.0.iter().enumerate().filter_map(|(k, own)| Some((k, (*own)?))) {
@@ -100,7 +75,7 @@ pub(super) fn nearest(known: &[&Likeness], own: &Likeness) -> Option<usize> {
         let mean = stats::mean(&all);
         let variance = stats::mean(&all.iter().map(|v| (v - mean).powi(2)).collect::<Vec<f64>>());
         for (distance, value) in distances.iter_mut().zip(values) {
-            // What is not known is taken to be as far as machines are from each other on average.
+            // An unknown parameter is assumed to be as far off as machines are on average.
             *distance += value.map_or(2.0, |v| if variance > 1e-12 { (v - own).powi(2) / variance } else { 0.0 });
         }
     }

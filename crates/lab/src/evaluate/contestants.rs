@@ -19,13 +19,7 @@ const FOREST: &str = "random forest";
 const NEAREST: &str = "nearest machine";
 const FULL_SWEEP: &str = "full sweep";
 
-/// Profiles of a training that the best single algorithm and the direct regression look at: a mean and a handful of slopes need no
-/// more, and both go through all of them for each held-out profile.
-const MOST_SEEN: usize = 100;
-/// Profiles that the direct regression looks for crossovers in, about.
-const MOST_CROSSED: usize = 200;
-
-/// The measured costs of profiles without a scenario of theirs.
+/// The measured costs of profiles without one of their scenarios.
 type Partial = BTreeMap<(usize, String), Arc<Vec<AlgorithmCost>>>;
 
 /// What all folds share.
@@ -33,13 +27,13 @@ pub(super) struct Material<'a> {
     pub(super) profiles: &'a [Profile],
     designs: &'a Designs<'a>,
     table: Table,
-    /// The regret table of each profile, once it is asked for.
+    /// The regret table of each profile, when it is first needed.
     regrets: Vec<OnceLock<RegretTable>>,
-    /// Which of two algorithms is cheaper where, of each profile; nothing of those that are not looked at.
+    /// Which of two algorithms is cheaper at which sizes, on each profile.
     outcomes: Vec<Vec<RoleOutcome>>,
     /// What machines are compared by, of each profile.
     likeness: Vec<Likeness>,
-    /// The measured costs of each profile, once they are asked for, and those without a scenario.
+    /// The measured costs of each profile, when they are first needed, and those without a scenario.
     costs: Vec<OnceLock<Vec<AlgorithmCost>>>,
     partial: Mutex<Partial>,
 }
@@ -50,10 +44,9 @@ pub(super) struct Fitted<'a> {
     /// Positions of the profiles of the training, and what their machines are compared by.
     known: Vec<usize>,
     likeness: Vec<&'a Likeness>,
-    /// Some of them with the mean regret of each algorithm when it is chosen always, and some of those whose crossovers were looked for.
+    /// These profiles with the mean regret of always choosing each algorithm.
     always: Vec<(&'a Profile, Vec<f64>)>,
-    crossed: Vec<(&'a Profile, &'a [RoleOutcome])>,
-    /// The model with its residual, and without; `None` where none could be fitted.
+    /// The model with its residual, and without; `None` when none could be fitted.
     models: Option<(Model, Model)>,
     forests: Forests,
     pub(super) notes: Vec<String>,
@@ -69,20 +62,18 @@ pub(super) struct Ours {
 pub(super) struct Contestant<'a> {
     pub(super) name: &'static str,
     pub(super) choose: Strategy<'a>,
-    /// The costs that it chooses by, where it has any.
+    /// The costs that it chooses by, if it predicts any.
     pub(super) costs: Option<&'a [AlgorithmCost]>,
 }
 
 impl<'a> Material<'a> {
     pub(super) fn new(profiles: &'a [Profile], designs: &'a Designs<'a>) -> Self {
-        let step = profiles.len().div_ceil(MOST_CROSSED).max(1);
-        let outcomes = |(k, p): (usize, &Profile)| if k.is_multiple_of(step) { role_outcomes(p) } else { Vec::new() };
         Self {
             profiles,
             designs,
             table: Table::new(profiles),
             regrets: profiles.iter().map(|_| OnceLock::new()).collect(),
-            outcomes: profiles.par_iter().enumerate().map(outcomes).collect(),
+            outcomes: profiles.par_iter().map(role_outcomes).collect(),
             likeness: profiles.iter().map(|p| Likeness::new(&p.hardware)).collect(),
             costs: profiles.iter().map(|_| OnceLock::new()).collect(),
             partial: Mutex::default(),
@@ -111,18 +102,13 @@ impl<'a> Material<'a> {
             }
         };
         let known: Vec<usize> = (0..self.profiles.len()).filter(|&k| chosen[k] && self.profiles[k].has_cpu()).collect();
-        let seen = known.iter().step_by(known.len().div_ceil(MOST_SEEN).max(1));
-        let mean = |k: usize| self.regret_table(k).always(without).iter().map(|always| always.mean).collect();
-        let crossed = known.iter().map(|&k| (&self.profiles[k], &self.outcomes[k][..]));
-        let crossed: Vec<_> = crossed.filter(|(_, outcomes)| !outcomes.is_empty()).collect();
-        let step = crossed.len().div_ceil(MOST_SEEN).max(1);
+        let always = |k: usize| self.regret_table(k).always(without).iter().map(|always| always.mean).collect();
         let left_out =
             |k: usize, spot: u32| without.is_some_and(|w| self.profiles[k].points[spot as usize].scenario == w);
         Ok(Fitted {
             without,
             likeness: known.iter().map(|&k| &self.likeness[k]).collect(),
-            always: seen.map(|&k| (&self.profiles[k], mean(k))).collect(),
-            crossed: crossed.into_iter().step_by(step).collect(),
+            always: known.iter().map(|&k| (&self.profiles[k], always(k))).collect(),
             models,
             forests: self.table.grow(&chosen, left_out)?,
             known,
@@ -130,17 +116,17 @@ impl<'a> Material<'a> {
         })
     }
 
-    /// What each choice costs on a profile.
+    /// Returns what each choice costs on a profile.
     pub(super) fn regret_table(&self, k: usize) -> &RegretTable {
         self.regrets[k].get_or_init(|| RegretTable::new(&self.profiles[k]))
     }
 
-    /// The measured costs of a profile.
+    /// Returns the measured costs of a profile.
     pub(super) fn costs(&self, k: usize) -> &[AlgorithmCost] {
         self.costs[k].get_or_init(|| measured_costs(&self.profiles[k]).0)
     }
 
-    /// The same without a scenario.
+    /// Returns the same without a scenario.
     fn costs_without(&self, k: usize, scenario: &str) -> Arc<Vec<AlgorithmCost>> {
         let key = (k, scenario.to_owned());
         let known = self.partial.lock().unwrap_or_else(PoisonError::into_inner).get(&key).map(Arc::clone);
@@ -155,7 +141,7 @@ impl<'a> Material<'a> {
 }
 
 impl Fitted<'_> {
-    /// What the model predicts for a profile, and a note where it predicts nothing.
+    /// Predicts a profile; adds a note when the model predicts nothing.
     pub(super) fn predict(&self, profile: &Profile, notes: &mut Vec<String>) -> Option<Ours> {
         let (whole, physics) = self.models.as_ref()?;
         let all = profile.with_revisions(&profile.available());
@@ -184,7 +170,7 @@ impl Fitted<'_> {
         ]
     }
 
-    /// All of them on one held-out profile.
+    /// Returns all strategies for a held-out profile.
     ///
     /// # Errors
     /// When a regression fails.
@@ -194,35 +180,25 @@ impl Fitted<'_> {
         held: usize,
         ours: Option<&'b Ours>,
         available: &'b [AlgorithmId],
-        notes: &mut Vec<String>,
     ) -> Result<Vec<Contestant<'b>>> {
         let profile = &data.profiles[held];
         let nearest = baselines::nearest(&self.likeness, &data.likeness[held]).map(|k| data.costs(self.known[k]));
-        let default_machine = match self.known.first() {
-            None => nothing(),
-            Some(&first) => {
-                let own = baselines::default_machine(&data.profiles[first], data.costs(first), available);
-                own.unwrap_or_else(|why| {
-                    notes.push(format!("there is no default machine when {} is held out: {why:#}", profile.file));
-                    nothing()
-                })
-            }
-        };
+        let crossed: Vec<(&Profile, &[RoleOutcome])> =
+            self.known.iter().map(|&k| (&data.profiles[k], &data.outcomes[k][..])).collect();
         let mut all = Vec::from(self.ours(profile, ours, available));
         all.extend([
             by(NEAREST, nearest, available),
-            alone("direct regression", direct(&self.crossed, &profile.hardware, available, notes)?),
+            alone("direct regression", direct(&crossed, &profile.hardware, available)?),
             alone("frozen constants (64)", baselines::frozen(64, "grid-sap", available)),
             alone("frozen constants (1000)", baselines::frozen(999, "sap", available)),
-            alone("default machine", default_machine),
-            // Its costs are those that crossovers are measured by.
+            // Crossovers are measured by its costs.
             Contestant { costs: None, ..by(FULL_SWEEP, Some(data.costs(held)), available) },
         ]);
         Ok(all)
     }
 
-    /// Those that are asked of scenarios that nobody has seen.
-    pub(super) fn asked_of_unseen<'b>(
+    /// Returns the strategies that are judged on unseen scenarios.
+    pub(super) fn judged_on_unseen<'b>(
         &'b self,
         data: &'b Material<'_>,
         held: usize,
@@ -236,14 +212,18 @@ impl Fitted<'_> {
         };
         let nearest = baselines::nearest(&self.likeness, &data.likeness[held]).map(|k| self.known[k]);
         all.push(alone(NEAREST, measured(nearest)));
-        // Its own machine is not held out from it, only the scenario.
+        // Only the scenario is held out from it, not its own machine.
         all.push(alone(FULL_SWEEP, measured(Some(held))));
         all
     }
 }
 
-/// Chooses the cheapest by costs; nothing, which counts as the worst, where there are none.
-fn by<'a>(name: &'static str, costs: Option<&'a [AlgorithmCost]>, available: &'a [AlgorithmId]) -> Contestant<'a> {
+/// Chooses the cheapest by costs, or nothing, which counts as the worst, without any.
+fn by<'a>(
+    name: &'static str,
+    costs: Option<&'a [AlgorithmCost]>,
+    available: &'a [AlgorithmId],
+) -> Contestant<'a> {
     let costs = costs.unwrap_or_default();
     let choose = if costs.is_empty() { nothing() } else { by_costs(costs.to_vec(), available) };
     Contestant { name, choose, costs: Some(costs) }

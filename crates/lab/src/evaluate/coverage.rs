@@ -1,4 +1,4 @@
-//! How far times lie from their prediction on machines held out, and how well the others tell that of one.
+//! How far times lie from their prediction on held-out machines, and how well the other machines predict that.
 
 use crate::data::Profile;
 use crate::training::Coverage;
@@ -6,7 +6,7 @@ use sapwise::AlgorithmCost;
 use sapwise::stats::{mean, quantile};
 use std::collections::BTreeMap;
 
-/// The share that an interval is to hold.
+/// The share of times that an interval should hold.
 const HELD: f64 = 0.9;
 
 /// Errors on one profile, as absolute natural logarithms.
@@ -15,7 +15,7 @@ pub(super) struct Errors {
     pub(super) machine: String,
     /// Of the times of all algorithms.
     times: Vec<f64>,
-    /// Of the ratio of the two fastest ones under each load.
+    /// Of the ratio of the two fastest algorithms under each load.
     ratios: Vec<f64>,
 }
 
@@ -38,7 +38,8 @@ impl Errors {
     }
 }
 
-/// What the machines tell together, and how much of each lies within what the others tell. `None` of fewer than two machines.
+/// Returns the intervals over all machines, and how much of each machine lies within those of the others. `None` with fewer than two
+/// machines.
 pub(super) fn coverage(all: &[Errors]) -> Option<Coverage> {
     let (times_90_ln, times) = of(all, |e| &e.times)?;
     let (ratios_90_ln, ratios) = of(all, |e| &e.ratios)?;

@@ -5,7 +5,7 @@ use crate::data::Profile;
 use crate::fit::{measured_slice, slice_tuning};
 use sapwise::{AlgorithmCost, AlgorithmId, Crossover, Load, Source, Tuning};
 
-/// The crossovers between the measured tuning of one profile, in the scenario of its slice.
+/// The crossovers of the measured tuning of one profile, in its usual scenario.
 #[derive(Debug, Clone, Default)]
 pub(super) struct MeasuredCrossovers {
     loads: Vec<Load>,
@@ -13,7 +13,7 @@ pub(super) struct MeasuredCrossovers {
 }
 
 impl MeasuredCrossovers {
-    /// By the measured costs of the profile; none where it has too few sizes or timings.
+    /// Derives them from the measured costs of the profile; none if it has too few sizes or timings.
     pub(super) fn new(profile: &Profile, costs: &[AlgorithmCost]) -> Self {
         let scenario = profile.usual_scenario();
         let found = measured_slice(profile, scenario).and_then(|loads| {
@@ -23,21 +23,21 @@ impl MeasuredCrossovers {
         found.unwrap_or_default()
     }
 
-    /// For each crossover that both algorithms have a predicted cost for, the nearest crossing of those costs in the same direction.
-    /// Where they do not cross so within the slice, the end beyond which they would, which is the upper one where the algorithm
-    /// below the crossover is predicted to be cheaper at it. The nearest number of threads stands for one that was not predicted.
+    /// Returns for each crossover whose algorithms have predicted costs the nearest crossing of those costs in the same direction. If they
+    /// don't cross so within the slice, it is the end beyond which they would: the upper one if the algorithm below the crossover is
+    /// predicted to be cheaper at it. The nearest number of threads stands in for one that was not predicted.
     pub(super) fn predicted(&self, costs: &[AlgorithmCost]) -> Vec<ComparedCrossover> {
         let ids: Vec<AlgorithmId> = costs.iter().map(|c| c.algorithm.clone()).collect();
         let cost = |id: &AlgorithmId| {
             let found = closest(id, &ids)?;
             let cost = costs.iter().find(|c| c.algorithm == found)?;
-            // Under its own name, since one cost may stand for both sides.
+            // Under its own name, since one cost may stand in for both sides.
             Some(AlgorithmCost::new(id.clone(), cost.revision, cost.curve.clone(), cost.spread_ln))
         };
         self.crossovers.iter().filter_map(|b| Some(self.compared(b, cost(&b.below)?, cost(&b.above)?))).collect()
     }
 
-    /// Octaves between the two positions of each of them.
+    /// Returns the octaves between the two positions of each of them.
     pub(super) fn errors(&self, costs: &[AlgorithmCost]) -> Vec<f64> {
         self.predicted(costs).iter().map(ComparedCrossover::octaves).collect()
     }
@@ -70,14 +70,14 @@ pub struct ComparedCrossover {
     pub above: AlgorithmId,
     /// Objects at the measured crossover.
     pub measured: f64,
-    /// Objects at the predicted one; where the predicted costs do not cross, the end of the slice beyond which they would.
+    /// Objects at the predicted one; if the predicted costs don't cross, the end of the slice beyond which they would.
     pub predicted: f64,
     /// Whether the predicted costs cross within the slice.
     pub crosses: bool,
 }
 
 impl ComparedCrossover {
-    /// Octaves between the two, a lower bound where the predicted costs do not cross.
+    /// Returns the octaves between the two, a lower bound if the predicted costs don't cross.
     pub fn octaves(&self) -> f64 {
         (self.predicted / self.measured).log2().abs()
     }

@@ -1,5 +1,5 @@
-//! The regression that the paper of Avril, Gouranton and Arnaldi (2011) asks for: positions of crossovers, directly from
-//! hardware parameters, and a choice by the number of objects alone. Kept as a baseline.
+//! The regression that the paper of Avril, Gouranton and Arnaldi (2011) asks for: positions of crossovers, directly from hardware parameters,
+//! and a choice by the number of objects alone.
 
 use super::regret_table::Strategy;
 use crate::data::{Profile, figure};
@@ -14,7 +14,7 @@ use sapwise::hardware::ParameterId;
 use sapwise::stats::mean;
 use sapwise::{AlgorithmId, BackendClass, Hardware};
 
-/// Parameters that a crossover is regressed on by least squares, as logarithms. Few, because there are as few rows as reports.
+/// Parameters whose logarithms a crossover is regressed on. Few, because there are only as many rows as reports.
 const PARAMETERS: [&str; 4] = [
     ParameterId::ClockMeasuredGhz.as_str(),
     ParameterId::SimdLanes.as_str(),
@@ -30,12 +30,12 @@ const GPU_PARAMETERS: [&str; 4] = [
     "gpu/arithmetic_gflop_per_s",
 ];
 
-/// A method on one thread or on all threads of its machine, on one GPU or on all: counts differ between machines, these do not.
+/// A method on one or all threads of its machine, or on one or all GPUs: every machine has these, whatever its counts.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Role {
     class: BackendClass,
     method: String,
-    /// All threads, or all GPUs; `false` where there is only one.
+    /// All threads, or all GPUs; `false` if there is only one.
     all: bool,
 }
 
@@ -51,12 +51,12 @@ impl std::fmt::Display for Role {
     }
 }
 
-/// Which of two roles is cheaper at which sizes on one machine.
+/// Which of two roles is cheaper at which sizes, on one machine.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct RoleOutcome {
     pub(super) first: Role,
     pub(super) second: Role,
-    /// Ascending; none where one of the two is always cheaper.
+    /// Ascending; none if one of the two is always cheaper.
     crossings: Vec<Crossing>,
     first_is_cheaper: bool,
 }
@@ -77,7 +77,7 @@ fn parameters(a: &Role, b: &Role) -> [&'static str; 4] {
     if [a, b].iter().any(|role| role.class == BackendClass::Gpu) { GPU_PARAMETERS } else { PARAMETERS }
 }
 
-/// What is found for each two roles of a profile in its scenario `uniform`, or its first one.
+/// Compares each two roles of a profile in its scenario `uniform`, or its first one.
 pub(super) fn role_outcomes(profile: &Profile) -> Vec<RoleOutcome> {
     let scenario = profile.usual_scenario();
     let ids: Vec<AlgorithmId> = profile.algorithms.iter().map(|t| t.id.clone()).collect();
@@ -112,7 +112,7 @@ pub(super) fn role_outcomes(profile: &Profile) -> Vec<RoleOutcome> {
     outcomes
 }
 
-/// The roles that algorithms play on a machine, in order. Of several single GPUs the first plays.
+/// Returns the roles of algorithms on a machine, in order. Of several single GPUs the first one counts.
 fn roles(ids: &[AlgorithmId]) -> Vec<(Role, AlgorithmId)> {
     let mut roles: Vec<(Role, AlgorithmId)> = Vec::new();
     for id in ids {
@@ -128,7 +128,7 @@ fn roles(ids: &[AlgorithmId]) -> Vec<(Role, AlgorithmId)> {
     roles
 }
 
-/// What is predicted for a pair of roles.
+/// The prediction for a pair of roles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Prediction {
     Always { first: bool },
@@ -144,9 +144,8 @@ impl Prediction {
     }
 }
 
-/// The direct regression by least squares, applied to a machine: the winner of most comparisons in pairs is chosen. `training` are profiles
-/// with what was found for their roles. Adds to `notes` how many of its crossovers are means because there were too few for a
-/// regression, and how many rest on profiles of high leverage.
+/// Applies the direct regression to a machine: the winner of most pairwise comparisons is chosen. `training` are profiles with the outcomes
+/// of their roles.
 ///
 /// # Errors
 /// When linfa refuses a fit.
@@ -154,30 +153,14 @@ pub(super) fn direct<'a>(
     training: &[(&Profile, &[RoleOutcome])],
     hardware: &Hardware,
     available: &[AlgorithmId],
-    notes: &mut Vec<String>,
 ) -> Result<Strategy<'a>> {
     let roles = roles(available);
     let mut predictions = Vec::new();
-    let (mut means, mut far) = (0, 0);
     for a in 0..roles.len() {
         for b in a + 1..roles.len() {
-            if let Some((prediction, estimate)) = predict(training, hardware, &roles[a].0, &roles[b].0)? {
-                means += usize::from(estimate.is_some_and(|e| e.mean));
-                far += usize::from(estimate.is_some_and(|e| e.far_rows > 0));
-                predictions.push((a, b, prediction));
-            }
+            let prediction = predict(training, hardware, &roles[a].0, &roles[b].0)?;
+            predictions.extend(prediction.map(|prediction| (a, b, prediction)));
         }
-    }
-    let count = predictions.len();
-    if means > 0 {
-        notes.push(format!(
-            "direct regression: {means} of {count} crossovers are means, there being no more crossings than parameters"
-        ));
-    }
-    if far > 0 {
-        notes.push(format!(
-            "direct regression: {far} of {count} crossovers rest on a profile with over twice the mean leverage"
-        ));
     }
     Ok(Box::new(move |load| {
         let ln_objects = f64::from(load.objects.max(1)).ln();
@@ -190,16 +173,16 @@ pub(super) fn direct<'a>(
     }))
 }
 
-/// What is predicted for a pair, and the estimate behind it where it is regressed. `None` where no machine of the training has both.
+/// Predicts a pair of roles; `None` when no machine of the training has both.
 ///
-/// Where most machines have a crossover it is regressed over those, the last of several; the others are not used, which is
-/// the weakness of this method. Where most have none, the more frequent winner always wins.
+/// If most machines have a crossover, the last one of each is regressed; the machines without are not used, which is the weakness of this
+/// method. If most have none, the more frequent winner always wins.
 fn predict(
     training: &[(&Profile, &[RoleOutcome])],
     hardware: &Hardware,
     a: &Role,
     b: &Role,
-) -> Result<Option<(Prediction, Option<Estimate>)>> {
+) -> Result<Option<Prediction>> {
     let of_pair = |outcomes: &'_ [RoleOutcome]| outcomes.iter().position(|c| c.first == *a && c.second == *b);
     let found: Vec<(&Hardware, &RoleOutcome)> = training
         .iter()
@@ -212,32 +195,21 @@ fn predict(
     if 2 * crossed.len() <= found.len() {
         let always = |c: &RoleOutcome, first: bool| c.crossings.is_empty() && c.first_is_cheaper == first;
         let [firsts, seconds] = [true, false].map(|first| found.iter().filter(|(_, c)| always(c, first)).count());
-        return Ok(Some((Prediction::Always { first: firsts >= seconds }, None)));
+        return Ok(Some(Prediction::Always { first: firsts >= seconds }));
     }
     let first_below = 2 * crossed.iter().filter(|(_, p)| p.first_below).count() >= crossed.len();
     let rows: Vec<_> = crossed.into_iter().filter(|(_, p)| p.first_below == first_below).collect();
     let machines: Vec<&Hardware> = rows.iter().map(|r| r.0).collect();
     let ln_objects: Vec<f64> = rows.iter().map(|r| r.1.objects.ln()).collect();
-    let estimate = estimate(&parameters(a, b), &machines, &ln_objects, hardware)?;
-    Ok(Some((Prediction::At { ln_objects: estimate.value, first_below }, Some(estimate))))
+    Ok(Some(Prediction::At { ln_objects: estimate(&parameters(a, b), &machines, &ln_objects, hardware)?, first_below }))
 }
 
-/// What a regression says of a machine.
-#[derive(Debug, Clone, Copy)]
-struct Estimate {
-    value: f64,
-    /// There was too little for a regression: it is the mean.
-    mean: bool,
-    /// Rows of high leverage, see [`Columns::far_rows`].
-    far_rows: usize,
-}
-
-/// Values on the logarithms of the parameters, evaluated for a machine. Parameters that are missing anywhere or say nothing of their own are
-/// not used; fewer of them where one row alone would decide a coefficient. The mean where there are not more rows than coefficients.
+/// Regresses values on the logarithms of parameters and evaluates the line for a machine. Skips parameters that are missing on any machine or
+/// that depend on others, and fits the mean when there are not more rows than coefficients.
 ///
 /// # Errors
 /// When linfa refuses a fit.
-fn estimate(names: &[&str], machines: &[&Hardware], values: &[f64], hardware: &Hardware) -> Result<Estimate> {
+fn estimate(names: &[&str], machines: &[&Hardware], values: &[f64], hardware: &Hardware) -> Result<f64> {
     let logarithm = |h: &Hardware, name: &str| figure(h, name).filter(|v| *v > 0.0).map(f64::ln);
     let there = |name: &&str| machines.iter().chain([&hardware]).all(|h| logarithm(h, name).is_some());
     let names: Vec<&str> = names.iter().copied().filter(there).collect();
@@ -245,36 +217,36 @@ fn estimate(names: &[&str], machines: &[&Hardware], values: &[f64], hardware: &H
     let table = Array2::from_shape_fn((machines.len(), names.len()), |(k, j)| {
         logarithm(machines[k], names[j]).unwrap_or_default()
     });
-    let (line, far_rows) = Line::least_squares(&table, values)?;
-    Ok(Estimate { value: line.at(&row(hardware)), mean: line.columns.kept.is_empty(), far_rows })
+    Ok(Line::least_squares(&table, values)?.at(&row(hardware)))
 }
 
-/// A fitted linear function of a row of figures.
+/// A fitted linear function of a row of numbers.
 #[derive(Debug, Clone)]
 pub(super) struct Line {
     pub(super) columns: Columns,
-    /// The value where every figure is at its mean.
+    /// The value at the mean of every column.
     pub(super) intercept: f64,
-    /// One for each kept column, against its standardised figures.
+    /// One for each kept column, against its standardised numbers.
     pub(super) slopes: Vec<f64>,
 }
 
 impl Line {
-    /// Ordinary least squares over a table of shape (rows, figures), and how many rows have a high leverage; the mean when
-    /// there are not more rows than coefficients.
-    pub(super) fn least_squares(table: &Array2<f64>, values: &[f64]) -> Result<(Self, usize)> {
+    /// Fits ordinary least squares to a table of shape (rows, columns); the mean when there are not more rows than coefficients.
+    ///
+    /// # Errors
+    /// When linfa refuses the fit.
+    pub(super) fn least_squares(table: &Array2<f64>, values: &[f64]) -> Result<Self> {
         let columns = Columns::new(table, &vec![1.0; values.len()]);
         if values.len() <= columns.kept.len() + 1 {
-            return Ok((Self::mean(table, values), 0));
+            return Ok(Self::mean(table, values));
         }
         let columns = columns.without_lone_rows();
         if columns.kept.is_empty() {
-            return Ok((Self::mean(table, values), 0));
+            return Ok(Self::mean(table, values));
         }
         let data = DatasetBase::new(columns.values.clone(), Array1::from(values.to_vec()));
         let fitted = LinearRegression::new().fit(&data).context("the direct regression of crossovers failed")?;
-        let far_rows = columns.far_rows();
-        Ok((Self { columns, intercept: fitted.intercept(), slopes: fitted.params().to_vec() }, far_rows))
+        Ok(Self { columns, intercept: fitted.intercept(), slopes: fitted.params().to_vec() })
     }
 
     fn mean(table: &Array2<f64>, values: &[f64]) -> Self {
@@ -282,10 +254,10 @@ impl Line {
         Self { columns, intercept: mean(values), slopes: Vec::new() }
     }
 
-    /// The value at a row with as many figures as the table has.
-    pub(super) fn at(&self, figures: &[f64]) -> f64 {
+    /// Returns the value at a row with as many numbers as the table has columns.
+    pub(super) fn at(&self, row: &[f64]) -> f64 {
         let c = &self.columns;
-        let term = |j: usize| self.slopes[j] * (figures[c.kept[j]] - c.centres[j]) / c.scales[j];
+        let term = |j: usize| self.slopes[j] * (row[c.kept[j]] - c.centres[j]) / c.scales[j];
         self.intercept + (0..self.slopes.len()).map(term).sum::<f64>()
     }
 }
@@ -305,10 +277,9 @@ mod tests {
             let outcomes: Vec<Vec<RoleOutcome>> = profiles.iter().map(role_outcomes).collect();
             let training: Vec<(&Profile, &[RoleOutcome])> =
                 profiles.iter().zip(&outcomes).take(6).map(|(p, o)| (p, &o[..])).collect();
-            let mut notes = Vec::new();
-            let choose = direct(&training, &profiles[6].hardware, &profiles[6].available(), &mut notes).unwrap();
+            let choose = direct(&training, &profiles[6].hardware, &profiles[6].available()).unwrap();
             let regret = RegretTable::new(&profiles[6]).regret(&profiles[6], &choose).mean;
-            assert!(regret < 1.0, "{regret} {notes:?}");
+            assert!(regret < 1.0, "{regret}");
         }
     }
 
@@ -320,10 +291,8 @@ mod tests {
             machines.iter().map(|h| 5.0 - 0.7 * h.value(ParameterId::SimdLanes).unwrap().ln()).collect();
         let known: Vec<&Hardware> = machines[..6].iter().collect();
         let of = |count: usize| estimate(&PARAMETERS, &known[..count], &values[..count], &machines[6]).unwrap();
-        let found = of(6);
-        assert!((found.value - values[6]).abs() < 1e-6 && !found.mean, "{found:?}");
-        let found = of(3);
-        assert!((found.value - mean(&values[..3])).abs() < 1e-12 && found.mean, "{found:?}");
+        assert!((of(6) - values[6]).abs() < 1e-6, "{}", of(6));
+        assert!((of(3) - mean(&values[..3])).abs() < 1e-12, "{}", of(3));
     }
 
     #[test]
@@ -332,9 +301,7 @@ mod tests {
         let mut random = Random::named(23, &[]);
         let table = Array2::from_shape_fn((9, 2), |(k, j)| if j == 0 { random.normal() } else { f64::from(k == 8) });
         let values: Vec<f64> = (0..9).map(|k| 5.0 + table[[k, 0]] + if k == 8 { 4.0 } else { 0.0 }).collect();
-        let (line, far_rows) = Line::least_squares(&table, &values).unwrap();
-        assert_eq!(line.columns.kept, [0]);
-        assert!(far_rows <= 1);
+        assert_eq!(Line::least_squares(&table, &values).unwrap().columns.kept, [0]);
     }
 
     #[test]
@@ -345,7 +312,7 @@ mod tests {
             table.rows().into_iter().map(|r| 2.0 + 0.3 * r[0] - 5.0 * r[1] + 0.1 * random.normal()).collect();
         let columns = Columns::new(&table, &[1.0; 30]);
         let data = DatasetBase::new(columns.values.clone(), Array1::from(values.clone()));
-        let line = Line::least_squares(&table, &values).unwrap().0;
+        let line = Line::least_squares(&table, &values).unwrap();
         let linfa = LinearRegression::new().fit(&data).unwrap().predict(&columns.values);
         for k in 0..30 {
             let own = line.at(&table.row(k).to_vec());

@@ -1,4 +1,4 @@
-//! What is lost by chance: two runs of one machine, each judged on the other.
+//! The noise floor: two runs of one machine, each judged on the other.
 
 use super::baselines::by_costs;
 use super::regret_table::{Regret, RegretTable};
@@ -9,10 +9,10 @@ use rayon::prelude::*;
 use sapwise::AlgorithmCost;
 use std::collections::BTreeMap;
 
-/// Scenarios that both runs need to have: fewer are no repetition of a sweep.
+/// Points that a run needs: fewer are no whole sweep.
 const FEWEST_POINTS: usize = 100;
 
-/// Of all profiles that repeat each other. `None` where none does.
+/// Returns the floor over all profiles that repeat each other; `None` if none does.
 pub(super) fn floor<'a>(
     profiles: &[Profile],
     table: impl Fn(usize) -> &'a RegretTable + Sync,
@@ -23,7 +23,7 @@ pub(super) fn floor<'a>(
         let algorithms: Vec<String> = p.algorithms.iter().map(|t| t.id.to_string()).collect();
         alike.entry((p.machine(), &p.setup, algorithms.join(" "))).or_default().push(k);
     }
-    // Each with the next one, both ways.
+    // Each with the next one, in both directions.
     let pairs: Vec<(usize, usize)> =
         alike.values().flat_map(|all| all.windows(2).flat_map(|w| [(w[0], w[1]), (w[1], w[0])])).collect();
     let judged = |&(from, on): &(usize, usize)| -> (Regret, Regret) {

@@ -1,4 +1,4 @@
-//! A random forest for the time of each method: what is left to a baseline that knows no physics.
+//! A random forest for the time of each method, the baseline that knows no physics.
 
 use super::regret_table::Strategy;
 use crate::data::{COMPARED, COMPARED_OF_GPUS, Profile};
@@ -17,8 +17,8 @@ type Key = (BackendClass, String);
 const TREES: usize = 50;
 /// Rows that a forest is grown from, at most.
 const MOST_ROWS: usize = 3000;
-/// Profiles that forests are grown from, about, spread over all, and rows of each at least for a method: of a profile with a
-/// handful of rows no tree learns how time grows with the load.
+/// Profiles that forests are grown from, about, and rows of each for a method, at least: from a handful of rows no tree learns how time grows
+/// with the load.
 const MOST_PROFILES: usize = 400;
 const FEWEST_OF_PROFILE: usize = 15;
 /// Rows in a leaf.
@@ -26,7 +26,7 @@ const LEAF: usize = 2;
 /// Seed of the trees.
 const SEED: u64 = 1;
 
-/// The rows of every method, worked out once for all forests.
+/// The rows of every method, for all forests.
 pub(super) struct Table(BTreeMap<Key, Vec<Example>>);
 
 struct Example {
@@ -38,8 +38,8 @@ struct Example {
 }
 
 impl Table {
-    /// A bound of an algorithm that had left the race counts as a time: a tree does not extrapolate, and without it what left
-    /// at a thousand objects would be predicted to take no longer for a million.
+    /// Collects the rows. The lower bound of an algorithm that had left the sweep counts as a time: a tree does not extrapolate, and would
+    /// predict the last time before it for a million objects.
     pub(super) fn new(profiles: &[Profile]) -> Self {
         let step = profiles.len().div_ceil(MOST_PROFILES).max(1);
         let most = (MOST_ROWS / profiles.len().div_ceil(step).max(1)).max(FEWEST_OF_PROFILE);
@@ -62,7 +62,7 @@ impl Table {
         Self(table)
     }
 
-    /// The forests of the chosen profiles, without the points that `left_out` names by profile and position.
+    /// Grows forests from the chosen profiles, without the points that `left_out` names by profile and position.
     ///
     /// # Errors
     /// When smartcore refuses a fit.
@@ -71,7 +71,7 @@ impl Table {
         for (key, examples) in &self.0 {
             let known: Vec<&Example> =
                 examples.iter().filter(|e| chosen[e.profile] && !left_out(e.profile, e.spot)).collect();
-            // At random: with even steps every profile would have rows of the same few sizes.
+            // At random: even steps would take rows of the same few sizes from every profile.
             let order = Random::new(SEED).shuffled(known.len());
             let known: Vec<&Example> = order.into_iter().take(MOST_ROWS).map(|k| known[k]).collect();
             if known.len() > LEAF {
@@ -82,11 +82,11 @@ impl Table {
     }
 }
 
-/// A forest for each method that was timed in the training.
+/// A forest for each method of the training.
 pub(super) struct Forests(BTreeMap<Key, Forest>);
 
 impl Forests {
-    /// The algorithm with the least predicted time.
+    /// Chooses the algorithm with the least predicted time.
     pub(super) fn chooser<'a>(&'a self, hardware: &'a Hardware, available: &'a [AlgorithmId]) -> Strategy<'a> {
         Box::new(move |load| {
             let ln_ns = |id: &AlgorithmId| self.0.get(&key(id))?.ln_ns(&features(hardware, id.backend(), load));
@@ -123,8 +123,8 @@ fn key(id: &AlgorithmId) -> Key {
     (id.backend().class(), id.method().to_owned())
 }
 
-/// What a tree may split by: the load, the number of threads or GPUs, and the logarithms of the parameters that machines are compared
-/// by, on a GPU those of the first one that takes part. A parameter that is missing is zero, which parts it from those that are there.
+/// Returns what a tree may split by: the load, the number of threads or GPUs, and the logarithms of the parameters that machines are compared
+/// by, on GPUs those of the first one. A missing parameter is zero.
 fn features(hardware: &Hardware, backend: &Backend, load: &Load) -> Vec<f64> {
     let of_load = [
         f64::from(load.objects).ln_1p(),

@@ -1,4 +1,4 @@
-//! What a picture shows of a validation.
+//! Times, regrets and crossovers of what was held out, for figures and tables.
 
 use super::crossovers::ComparedCrossover;
 use super::scores::{Judged, OURS, regrets_of_units};
@@ -16,9 +16,9 @@ const MOST_TIMES: usize = 900;
 pub struct HeldOut {
     /// Measured and predicted times, thinned evenly.
     pub times: Vec<Time>,
-    /// For each strategy the mean regret on each held-out machine, or profile where there is one machine only.
+    /// For each strategy the mean regret on each held-out machine, or on each profile of the only one.
     pub regrets: Vec<(&'static str, Vec<f64>)>,
-    /// The machine, by its physical id, or the file of the profile that each regret of [`OURS`] is of.
+    /// The machine, or the file of the profile, that each regret of [`OURS`] is of.
     pub units: Vec<String>,
     /// Whether the regrets are of machines.
     pub by_machine: bool,

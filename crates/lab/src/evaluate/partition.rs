@@ -1,33 +1,32 @@
-//! What is held out together when a strategy is judged.
+//! Which profiles are held out together.
 
 use crate::data::Profile;
 use sapwise::hardware::ParameterId;
 use std::collections::BTreeMap;
 
-/// Machines that are held out one by one; of more, groups are made of them, as many as is usual in cross-validation. Each fold costs a fit of
-/// everything.
+/// Most machines that are held out one by one, and groups that more machines form. Each fold costs a fit of everything.
 const MOST_ALONE: usize = 24;
 const GROUPS: usize = 10;
 
-/// The profiles of each fold: they are judged by what was fitted to all others.
+/// Folds of profiles: each is judged by what was fitted to all others.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Partition {
     /// What a fold is, in words.
     pub held_out: String,
     /// Whether folds are of whole physical machines.
     pub by_machine: bool,
-    /// Positions of profiles. Where one machine was restricted in several ways a profile is in one fold for each of them.
+    /// Positions of profiles. A profile of the only machine is in one fold for each of its restrictions.
     pub folds: Vec<Vec<usize>>,
 }
 
 impl Partition {
-    /// Each physical machine with all its profiles; of one machine alone each of its SIMD levels and each of its thread counts; of one
-    /// without such restrictions each profile.
+    /// Makes a fold of each physical machine with all its profiles; of one machine alone, of each SIMD level and each thread count; without
+    /// such restrictions, of each profile.
     pub fn new(profiles: &[Profile]) -> Self {
         Self::of_machines(profiles, MOST_ALONE, GROUPS).unwrap_or_else(|| Self::of_restrictions(profiles))
     }
 
-    /// Up to `most_alone` machines one by one, else `groups` of them; `None` with fewer than two machines.
+    /// Holds out up to `most_alone` machines one by one, more in `groups`; `None` with fewer than two machines.
     pub fn of_machines(profiles: &[Profile], most_alone: usize, groups: usize) -> Option<Self> {
         let machines = grouped(profiles, |p| p.machine().to_owned());
         let count = machines.len();
@@ -62,7 +61,7 @@ impl Partition {
     }
 }
 
-/// Positions of the profiles that share a key, in the order of their keys.
+/// Returns the positions of the profiles that share a key, in the order of the keys.
 fn grouped(profiles: &[Profile], key: impl Fn(&Profile) -> String) -> Vec<Vec<usize>> {
     let mut groups: BTreeMap<String, Vec<usize>> = BTreeMap::new();
     for (k, profile) in profiles.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! What each choice costs on a report: the regret.
+//! The regret of each choice on a report.
 
 use crate::data::{Profile, Spot};
 use crate::spread::range;
@@ -6,26 +6,25 @@ use sapwise::stats::mean;
 use sapwise::{AlgorithmId, Load};
 use std::collections::BTreeMap;
 
-/// Chooses an algorithm under a load among those that a machine has; `None` where it knows none of them.
+/// Chooses an algorithm of a machine for a load; `None` if it knows none of them.
 pub type Strategy<'a> = Box<dyn Fn(&Load) -> Option<AlgorithmId> + 'a>;
 
-/// The cost of an algorithm over the best, where nothing is known of it: a guess. Who leaves the race as hopeless is slower
-/// than this, but where time is short an algorithm leaves at three times the best already.
+/// Assumed cost over the best for an algorithm that was not timed nearby. A hopeless algorithm is slower than this, but when time is short an
+/// algorithm leaves the sweep at three times the best already.
 pub const NOT_TIMED: f64 = 10.0;
 
-/// Sizes a decade that count as one when regrets are averaged.
+/// Cells a decade of the number of objects.
 const PER_DECADE: f64 = 4.0;
-/// Rounds of taking means over algorithms and over points in turn; the figures of a cell stand still after a few.
+/// Rounds of taking means over algorithms and over points in turn. The values stand still after a few.
 const ROUNDS: usize = 8;
-/// Base-10 logarithm of the number of objects that a game has most often, and its standard deviation: an assumption. From the 64
-/// colliders at which nexus leaves brute force to the 10 000 bodies of a large scene is two standard deviations to either side.
+/// Mean and standard deviation of the base-10 logarithm of the number of objects in games, an assumption: the 64 colliders at which nexus
+/// leaves brute force and the 10 000 bodies of a large scene lie two standard deviations to either side.
 const USUAL_OBJECTS: (f64, f64) = (2.9, 0.55);
 
-/// The regret table of a report: what each algorithm costs in each cell: a quarter of a decade of a scenario.
+/// The cost of each algorithm of a report in each cell, a quarter of a decade of a scenario, over the best.
 ///
-/// A sweep goes most often to the sizes at which two algorithms lie close, where every choice costs little. Counted one by one these
-/// points would pass off any strategy as better than it is. And the least of several medians is too low by their errors, more
-/// so where more algorithms lie close: the fewer errors are left in a figure that is compared, the less a choice is charged for them.
+/// A sweep visits most often the sizes at which two algorithms lie close, where every choice costs little: counted one by one these points
+/// would flatter any strategy. And the least of several medians is too low by their errors, which averaging over a cell reduces.
 #[derive(Debug, Clone)]
 pub struct RegretTable {
     cells: Vec<Cell>,
@@ -48,23 +47,23 @@ struct Cell {
 pub struct Regret {
     /// For each cell, the mean over its points.
     pub cells: Vec<f64>,
-    /// How often a game has the number of objects of each, in proportion.
+    /// How often games have that number of objects, in proportion.
     pub weights: Vec<f64>,
     /// Mean over the cells.
     pub mean: f64,
-    /// Mean over the cells, weighted by how often a game has that number of objects.
+    /// Mean over the cells with these weights.
     pub as_in_games: f64,
 }
 
 impl Regret {
-    /// Of these cells with their weights.
+    /// Averages cells with weights.
     fn of(cells: Vec<f64>, weights: Vec<f64>) -> Self {
         let total: f64 = weights.iter().sum();
         let weighted: f64 = cells.iter().zip(&weights).map(|(r, w)| r * w).sum();
         Self { mean: mean(&cells), as_in_games: if total > 0.0 { weighted / total } else { 0.0 }, cells, weights }
     }
 
-    /// Of the cells of both.
+    /// Averages the cells of both.
     #[must_use]
     pub fn and(mut self, other: Self) -> Self {
         self.cells.extend(other.cells);
@@ -72,7 +71,7 @@ impl Regret {
         Self::of(self.cells, self.weights)
     }
 
-    /// The least and the largest of a cell; `None` where there is no cell.
+    /// Returns the least and the largest regret of a cell.
     #[must_use]
     pub fn range(&self) -> Option<[f64; 2]> {
         range(&self.cells)
@@ -80,13 +79,13 @@ impl Regret {
 }
 
 impl RegretTable {
-    /// Of one report, by the medians over frames.
+    /// Makes the table of a report by the medians over frames.
     #[must_use]
     pub fn new(profile: &Profile) -> Self {
         Self::by(profile, |spot| spot.medians.clone())
     }
 
-    /// Of one report, by the means over frames, which is what a user waits for. One frame that another program interrupted moves them.
+    /// Makes the table of a report by the means over frames, for which a user waits. One interrupted frame moves them.
     #[must_use]
     pub fn by_means(profile: &Profile) -> Self {
         Self::by(profile, |spot| spot.medians.iter().zip(&spot.means).map(|(m, mean)| (m.0, *mean)).collect())
@@ -111,7 +110,7 @@ impl RegretTable {
             scenario: scenario.to_owned(),
             decade: quarter as f64 / PER_DECADE,
             loads: spots.iter().map(|s| s.load).collect(),
-            // Who was not timed here may have been timed in the next cell: how far behind changes little from one to the other.
+            // An algorithm that was not timed here is assumed to be as far behind as in a neighbouring cell.
             over_best: (0..algorithms)
                 .map(|k| {
                     [0, -1, 1].into_iter().find_map(|d| over_best((scenario, quarter + d), k)).unwrap_or(NOT_TIMED)
@@ -121,12 +120,12 @@ impl RegretTable {
         Self { cells: cells.collect(), algorithms }
     }
 
-    /// The regret of a strategy among the algorithms of this profile.
+    /// Returns the regret of a strategy on this profile.
     pub fn regret(&self, profile: &Profile, choose: &Strategy<'_>) -> Regret {
         self.regret_in(None, profile, choose)
     }
 
-    /// The same under the loads of one scenario, or of all.
+    /// Returns the same for one scenario, or for all.
     pub fn regret_in(&self, scenario: Option<&str>, profile: &Profile, choose: &Strategy<'_>) -> Regret {
         let of = |cell: &Cell, load: &Load| {
             let chosen = choose(load).and_then(|id| profile.position(&id));
@@ -136,14 +135,14 @@ impl RegretTable {
         summed(cells, |cell| mean(&cell.loads.iter().map(|load| of(cell, load)).collect::<Vec<f64>>()))
     }
 
-    /// The regret of choosing each algorithm always, under the loads of all scenarios but one, or of all.
+    /// Returns the regret of always choosing each algorithm, over all scenarios but one, or over all.
     pub fn always(&self, without: Option<&str>) -> Vec<Regret> {
         let cells = || self.cells.iter().filter(|c| without.is_none_or(|w| c.scenario != w));
         (0..self.algorithms).map(|k| summed(cells(), |cell| cell.over_best[k] - 1.0)).collect()
     }
 
-    /// The regret of choosing in each cell what is best in the same cell of another table of the same algorithms, each given by its id; nothing of
-    /// cells that the other one lacks.
+    /// Returns the regret of choosing in each cell what is best in the same cell of another table; cells that the other one lacks don't
+    /// count.
     pub fn by_cells_of(&self, profile: &Profile, other: &Self, of_other: &Profile) -> Regret {
         let alike = |cell: &Cell| other.cells.iter().find(|c| c.scenario == cell.scenario && c.decade == cell.decade);
         let chosen = |cell: &Cell| -> Option<f64> {
@@ -168,14 +167,13 @@ fn quarter(spot: &Spot) -> i64 {
     (PER_DECADE * f64::from(spot.load.objects.max(1)).log10()).round() as i64
 }
 
-/// How often a game has a number of objects with this base-10 logarithm, in proportion.
+/// Returns how often games have a number of objects with this base-10 logarithm, in proportion.
 fn in_games(decade: f64) -> f64 {
     (-((decade - USUAL_OBJECTS.0) / USUAL_OBJECTS.1).powi(2) / 2.0).exp()
 }
 
-/// Natural logarithm of the cost of each algorithm over the points of a cell, up to what they share: the algorithms' part of a sum of
-/// what belongs to the algorithm and what belongs to the point. Not every algorithm was timed at every point, and a point with more
-/// objects costs all of them more.
+/// Returns the natural logarithm of the cost of each algorithm over the points of a cell, up to a common constant: the logarithm of a time is
+/// the sum of a part of the algorithm and a part of the point, since not every algorithm was timed at every point.
 fn ln_costs(spots: &[Vec<(u16, f64)>], algorithms: usize) -> Vec<Option<f64>> {
     let mut costs: Vec<Option<f64>> = vec![None; algorithms];
     let mut shared = vec![0.0; spots.len()];

@@ -2,13 +2,12 @@
 
 use super::regret_table::Regret;
 use crate::data::Profile;
-use crate::fit::robust::value_at_weight;
 use crate::spread::range;
 use crate::training::{MethodScore, Regrets, Split};
 use sapwise::stats::{self, median};
 use std::collections::BTreeMap;
 
-/// The strategy that scores are relative to.
+/// The strategy whose gap to the best choice others close.
 pub const SINGLE_BEST: &str = "single best";
 /// The strategy of `predict`.
 pub const OURS: &str = "physics + load";
@@ -23,12 +22,12 @@ pub(super) struct Judged {
     pub(super) file: String,
     /// The physical machine.
     pub(super) machine: String,
-    /// Whether an algorithm ran on several threads.
+    /// Whether any algorithm ran on several threads.
     pub(super) several_threads: bool,
     pub(super) regret: Regret,
-    /// The same where the scenario was held out too; `None` where that was not asked.
+    /// Regret with the scenario held out too; `None` if the strategy is not judged on that.
     pub(super) unseen: Option<Regret>,
-    /// The same judged by the means over frames.
+    /// Regret by the means over frames.
     pub(super) by_means: Option<Regret>,
     /// Octaves between measured and predicted crossovers; `None` of a strategy that predicts no costs.
     pub(super) crossings: Option<Vec<f64>>,
@@ -48,30 +47,29 @@ impl Judged {
         }
     }
 
-    /// What one regret is told of: the machine, or the profile of the only one, which is held out more than once, with its vectors and
-    /// with its threads.
+    /// Returns what one regret is of: the machine, or the profile if there is one machine only.
     pub(super) fn unit(&self, by_machine: bool) -> &str {
         if by_machine { &self.machine } else { &self.file }
     }
 }
 
-/// The scores of every strategy. Every physical machine counts the same, its profiles sharing its weight.
+/// Scores every strategy. Every physical machine counts the same; its profiles share its weight.
 pub(super) fn scores(all: &[Judged], by_machine: bool) -> Vec<MethodScore> {
     let mut score: Vec<MethodScore> = names(all).into_iter().map(|name| score(all, name, by_machine)).collect();
     let single = score.iter().find(|s| s.name == SINGLE_BEST).map_or(0.0, |s| s.mean_regret);
-    // The oracle has no regret. Where the single best has none either there is no gap to close.
+    // Without a regret of the single best there is no gap to close.
     let gap = |regret: f64| if single > 0.0 { (single - regret) / single } else { 0.0 };
     score.iter_mut().for_each(|s| s.closed_gap = gap(s.mean_regret));
     score
 }
 
-/// For each strategy, in the order of the first profile, the mean regret on each held-out machine, or profile where there is one machine
-/// only.
+/// Returns for each strategy, in the order of the first profile, the mean regret on each held-out machine, or on each profile of the only
+/// one.
 pub(super) fn regrets_of_units(all: &[Judged], by_machine: bool) -> Vec<(&'static str, Vec<f64>)> {
     names(all).into_iter().map(|name| (name, of_units(all, name, by_machine, |r| r.mean))).collect()
 }
 
-/// The mean of a regret of a strategy on each held-out machine or profile.
+/// Returns the mean regret of a strategy on each held-out machine or profile.
 fn of_units(all: &[Judged], name: &str, by_machine: bool, of: impl Fn(&Regret) -> f64) -> Vec<f64> {
     let mut units: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
     all.iter()
@@ -80,7 +78,7 @@ fn of_units(all: &[Judged], name: &str, by_machine: bool, of: impl Fn(&Regret) -
     units.values().map(|regrets| stats::mean(regrets)).collect()
 }
 
-/// The names of the strategies, in the order of the first profile.
+/// Returns the names of the strategies, in the order of the first profile.
 fn names(all: &[Judged]) -> Vec<&'static str> {
     let mut names: Vec<&str> = Vec::new();
     all.iter().for_each(|j| {
@@ -141,7 +139,7 @@ fn of<'a>(own: &[&'a Judged], which: impl Fn(&'a Judged) -> Option<&'a Regret>) 
     own.iter().filter_map(part).collect()
 }
 
-/// Mean regrets, each physical machine counting the same; `None` of none.
+/// Returns mean regrets, each physical machine counting the same; `None` without any.
 pub(super) fn split(parts: &[Part<'_>]) -> Option<Split> {
     let of = |admitted: &dyn Fn(&Part<'_>) -> bool| -> Option<Regrets> {
         let mut machines: BTreeMap<&str, Vec<&Regret>> = BTreeMap::new();
@@ -160,17 +158,21 @@ pub(super) fn split(parts: &[Part<'_>]) -> Option<Split> {
     })
 }
 
-/// Mean of values with their weights.
+/// Returns the mean of values with weights.
 fn mean(values: &[(f64, f64)]) -> f64 {
     let total: f64 = values.iter().map(|v| v.1).sum();
     values.iter().map(|v| v.0 * v.1).sum::<f64>() / total
 }
 
-/// The least value that 95 % of the weight do not exceed.
-pub(super) fn percentile_95(mut values: Vec<(f64, f64)>) -> f64 {
+/// Returns the least value that 95 % of the weight do not exceed.
+fn percentile_95(mut values: Vec<(f64, f64)>) -> f64 {
     values.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let needed = 0.95 * values.iter().map(|v| v.1).sum::<f64>() - 1e-9;
-    value_at_weight(&values, needed).unwrap_or(0.0)
+    let mut left = 0.95 * values.iter().map(|v| v.1).sum::<f64>() - 1e-9;
+    let reached = |&&(_, weight): &&(f64, f64)| {
+        left -= weight;
+        left <= 0.0
+    };
+    values.iter().find(reached).map_or(0.0, |v| v.0)
 }
 
 #[cfg(test)]

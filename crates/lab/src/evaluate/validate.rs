@@ -1,4 +1,4 @@
-//! How well each strategy does on machines that it was not trained on, in scenarios that it has seen and that it has not.
+//! How well each strategy does on machines that it was not trained on, in seen and in unseen scenarios.
 
 use super::contestants::{Contestant, Fitted, Material};
 use super::coverage::{Errors, coverage};
@@ -16,29 +16,26 @@ use anyhow::Result;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Profiles that are judged, of all folds together, about: scores of a hundred machines change little with thousands more.
+/// Profiles that are judged, of all folds together, about.
 const MOST_JUDGED: usize = 120;
-/// Fits without a fold and without a scenario, at most: of many machines each is held out in some scenarios.
+/// Fits without a fold and a scenario, at most: of many machines each is held out in some scenarios only.
 const MOST_UNSEEN: usize = 80;
-/// And of so many profiles fewer, since each fit takes longer.
-const MANY_PROFILES: usize = 500;
-const FEW_UNSEEN: usize = 8;
 
-/// What a validation finds.
+/// The result of a validation.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Validated {
     /// The score of every strategy.
     pub validation: Validation,
-    /// In sentences, what the scores do not say.
+    /// Sentences on what the scores do not say.
     pub notes: Vec<String>,
-    /// What a picture shows of it.
+    /// Regrets and crossovers of what was held out.
     pub held_out: HeldOut,
 }
 
-/// Holds out one fold of a [`Partition`] after the other, fits to the others and lets every strategy choose on what was held out.
+/// Holds out one fold of a [`Partition`] after the other, fits to the others, and lets every strategy choose on what was held out.
 ///
-/// With one profile no strategy is scored. Each fold is a step of `progress`.
+/// Scores no strategy when there is one profile only. Each fold is a step of `progress`.
 ///
 /// # Errors
 /// When a regression fails, or the user asked to stop.
@@ -66,7 +63,7 @@ pub fn validate(
         notes.push("the full sweep is judged by the timings that it was fitted to".to_owned());
         let data = Material::new(profiles, designs);
         let most = MOST_JUDGED.div_ceil(partition.folds.len());
-        // Evenly over a fold, in which the profiles of a machine stand together; those of GPUs alone are no choice.
+        // Evenly over a fold. Profiles of GPUs alone are left out: a program always has the CPU to choose as well.
         let judged = |fold: &Vec<usize>| -> Vec<usize> {
             let whole: Vec<usize> = fold.iter().copied().filter(|&k| profiles[k].has_cpu()).collect();
             let step = whole.len().div_ceil(most).max(1);
@@ -114,7 +111,7 @@ pub fn validate(
     Ok(Validated { validation, notes, held_out: HeldOut::new(&all, times, crossovers, partition.by_machine) })
 }
 
-/// What is found on one fold.
+/// The results on one fold.
 #[derive(Default)]
 struct Found {
     judged: Vec<Judged>,
@@ -124,7 +121,7 @@ struct Found {
     notes: Vec<String>,
 }
 
-/// The regrets of every strategy on some of the profiles of a fold, by what was fitted without it.
+/// Judges every strategy on some of the profiles of a fold, as fitted without it.
 ///
 /// # Errors
 /// When a regression fails.
@@ -134,7 +131,7 @@ fn held_out(data: &Material<'_>, fitted: &Fitted<'_>, judged: &[usize]) -> Resul
         let profile = &data.profiles[held];
         let ours = fitted.predict(profile, &mut found.notes);
         let available = profile.available();
-        let contestants = fitted.contestants(data, held, ours.as_ref(), &available, &mut found.notes)?;
+        let contestants = fitted.contestants(data, held, ours.as_ref(), &available)?;
         let costs = ours.as_ref().map(|o| &o.whole[..]);
         let measured = MeasuredCrossovers::new(profile, data.costs(held));
         if let Some(costs) = costs {
@@ -155,7 +152,7 @@ fn held_out(data: &Material<'_>, fitted: &Fitted<'_>, judged: &[usize]) -> Resul
     Ok(found)
 }
 
-/// For each judged profile and strategy that is asked the regret where each scenario in turn was held out too.
+/// Returns the regret of each strategy on each judged profile when each scenario in turn was held out too.
 ///
 /// # Errors
 /// As [`held_out`].
@@ -169,9 +166,8 @@ fn unseen(
     if scenarios.len() < 2 {
         return Ok(BTreeMap::new());
     }
-    let most = if data.profiles.len() > MANY_PROFILES { FEW_UNSEEN } else { MOST_UNSEEN };
     let fits = partition.folds.iter().flat_map(|fold| scenarios.iter().map(move |s| (fold, *s)));
-    let step = (partition.folds.len() * scenarios.len()).div_ceil(most);
+    let step = (partition.folds.len() * scenarios.len()).div_ceil(MOST_UNSEEN);
     let fits: Vec<(&Vec<usize>, &str)> = fits.step_by(step).collect();
     let one = |&(fold, scenario): &(&Vec<usize>, &str)| -> Result<Vec<((String, &'static str), Regret)>> {
         progress.check()?;
@@ -186,7 +182,7 @@ fn unseen(
             let profile = &data.profiles[k];
             let ours = fitted.predict(profile, &mut Vec::new());
             let available = profile.available();
-            for c in fitted.asked_of_unseen(data, k, ours.as_ref(), &available) {
+            for c in fitted.judged_on_unseen(data, k, ours.as_ref(), &available) {
                 let regret = data.regret_table(k).regret_in(Some(scenario), profile, &c.choose);
                 regrets.push(((profile.file.clone(), c.name), regret));
             }

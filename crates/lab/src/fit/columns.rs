@@ -1,17 +1,15 @@
-//! Columns of a regression: standardised, only those that say something of their own, and how much rests on single rows.
+//! The columns of a regression: standardised, and only those that add something and do not rest on a single row.
 
 use ndarray::{Array1, Array2, ArrayView1, Axis};
 
-/// Share of its variation that a column must have for itself, beside the columns before it.
+/// Share of its variation that a column must not share with the columns before it.
 const OWN_SHARE: f64 = 0.02;
 
-/// Leverage from which on a row decides a coefficient alone. The error of a row in a fit without it is its error in the fit
-/// with it over one less its leverage (Hoaglin and Welsch, The Hat Matrix in Regression and ANOVA, 1978), so here at least a
-/// hundred times that.
+/// Leverage above which a row decides a coefficient alone: without that row its error would be over a hundred times as large (Hoaglin and
+/// Welsch, The Hat Matrix in Regression and ANOVA, 1978).
 const ALONE: f64 = 0.99;
 
-/// Standardised columns. linfa answers without a warning when columns depend on each other or when one row decides a
-/// coefficient, so its callers go through this first.
+/// Standardised columns. linfa does not warn when columns depend on each other or one row decides a coefficient.
 #[derive(Debug, Clone)]
 pub(crate) struct Columns {
     /// Positions of the columns that were kept, in the given order.
@@ -27,16 +25,15 @@ pub(crate) struct Columns {
 }
 
 impl Columns {
-    /// Standardises `values` of shape (rows, columns) under row weights with a sum above zero, and drops each column that
-    /// does not vary, or in one row only, or is a combination of those before it.
+    /// Standardises `values` of shape (rows, columns) under row weights with a sum above zero. Drops each column that does not vary, varies
+    /// in one row only, or is a combination of those before it.
     pub(crate) fn new(values: &Array2<f64>, weights: &[f64]) -> Self {
         let varying = Self::varying(values, weights);
         let independent: Vec<usize> = varying.base().into_iter().map(|(j, _)| j).collect();
         varying.select(&independent)
     }
 
-    /// The same without the test of rank, for a fit whose penalty leaves one answer for columns that depend on each other too.
-    pub(crate) fn varying(values: &Array2<f64>, weights: &[f64]) -> Self {
+    fn varying(values: &Array2<f64>, weights: &[f64]) -> Self {
         let total: f64 = weights.iter().sum();
         let shares: Vec<f64> = weights.iter().map(|w| w / total).collect();
         let mean = |c: ArrayView1<'_, f64>| c.iter().zip(&shares).map(|(v, s)| v * s).sum::<f64>();
@@ -62,8 +59,7 @@ impl Columns {
         Self { kept, centres, scales, values, shares }
     }
 
-    /// Drops, one after the other, the column that owes most to a row which decides a coefficient alone, until there is no
-    /// such row.
+    /// Drops, one after the other, the column that owes most to a row that decides a coefficient alone, until no row does.
     pub(crate) fn without_lone_rows(mut self) -> Self {
         loop {
             let base = self.base();
@@ -78,23 +74,14 @@ impl Columns {
         }
     }
 
-    /// How many rows have a leverage above 2 p / M, twice the mean, with p coefficients, that of the mean included, and M rows.
-    /// Such rows deserve a look (Hoaglin and Welsch 1978; Belsley, Kuh and Welsch, Regression Diagnostics, 1980, section 2.1).
-    pub(crate) fn far_rows(&self) -> usize {
-        let limit = 2.0 * (self.kept.len() + 1) as f64 / self.values.nrows() as f64;
-        self.leverages().into_iter().filter(|&h| h > limit).count()
-    }
-
-    /// What share of the fitted value of each row comes from its own target, in a fit with a mean: the diagonal of the hat
-    /// matrix. For columns of full rank.
-    pub(crate) fn leverages(&self) -> Vec<f64> {
+    /// Returns the leverage of each row in a fit with a mean: the diagonal of the hat matrix. For columns of full rank.
+    fn leverages(&self) -> Vec<f64> {
         let base = self.base();
         let row = |k: usize| self.shares[k] + base.iter().map(|(_, q)| q[k] * q[k]).sum::<f64>();
         (0..self.shares.len()).map(row).collect()
     }
 
-    /// The columns of `values` times the roots of their shares, each cleared of those before it and of length one, with
-    /// its position; without those that have too little of their own.
+    /// Orthonormalises the columns times the roots of the shares. Returns each with its position, without those that depend on others.
     fn base(&self) -> Vec<(usize, Array1<f64>)> {
         let roots = Array1::from_iter(self.shares.iter().map(|s| s.sqrt()));
         let mut base: Vec<(usize, Array1<f64>)> = Vec::new();
@@ -114,7 +101,7 @@ impl Columns {
         base
     }
 
-    /// Some of the columns, by their positions among those kept.
+    /// Returns some of the columns, by their positions among those kept.
     fn select(&self, some: &[usize]) -> Self {
         let of = |list: &[f64]| some.iter().map(|&j| list[j]).collect();
         Self {
@@ -160,15 +147,6 @@ mod tests {
         let twice = Columns::new(&array![[1.0], [2.0], [3.0], [3.0], [6.0]], &[1.0; 5]).leverages();
         let weighted = Columns::new(&array![[1.0], [2.0], [3.0], [6.0]], &[1.0, 1.0, 2.0, 1.0]).leverages();
         assert!((weighted[2] - 2.0 * twice[2]).abs() < 1e-12 && (weighted[3] - twice[4]).abs() < 1e-12);
-    }
-
-    #[test]
-    fn rows_of_more_than_twice_the_mean_leverage_are_counted() {
-        let even = Array2::from_shape_fn((10, 1), |(i, _)| i as f64);
-        assert_eq!(Columns::new(&even, &[1.0; 10]).far_rows(), 0);
-        let mut far = even.clone();
-        far[[4, 0]] = 60.0;
-        assert_eq!(Columns::new(&far, &[1.0; 10]).far_rows(), 1);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! How a method calls its helpers: four figures that explain what several threads take by what one takes.
+//! How a method calls its helpers: four numbers that predict the time on several threads from that on one.
 
 use sapwise::model::{HelpersModel, ThreadFigures};
 
@@ -7,24 +7,25 @@ use sapwise::model::{HelpersModel, ThreadFigures};
 pub(crate) struct Called {
     pub(crate) objects: u32,
     pub(crate) threads: u32,
-    /// What one thread is modelled to take.
+    /// The modelled time on one thread.
     pub(crate) work_ns: f64,
     pub(crate) ns: f64,
     pub(crate) weight: f64,
     pub(crate) figures: ThreadFigures,
 }
 
-/// Values that are tried, with the other figures as they are.
+/// Values that are tried for each number.
 const CALL_CYCLES: [f64; 11] = [0.0, 100.0, 200.0, 400.0, 700.0, 1000.0, 1500.0, 2000.0, 3000.0, 5000.0, 8000.0];
 const LATE_SHARES: [f64; 13] = [0.0, 0.03, 0.06, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0];
 const SERIAL_SHARES: [f64; 13] = [0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0];
-/// What the methods of this library need to call a thread, and whoever calls always.
+/// Boxes from which on another thread is called: always, or those of the methods of this library.
 const BOXES_PER_THREAD: [u32; 2] = [0, 1024];
-/// Rounds over all figures, and starts: serial shares far apart.
+/// Rounds over all numbers, and serial shares to start from.
 const ROUNDS: usize = 6;
 const STARTS: [f64; 2] = [0.1, 0.4];
 
-/// The figures with the least weighted mean of absolute logarithmic errors: robust, since the tasks of some frames wait for a core. `None` of no timing.
+/// Returns the numbers with the least weighted sum of absolute logarithmic errors, which is robust: some frames wait for a core. `None`
+/// without timings.
 pub(crate) fn fit(called: &[Called]) -> Option<HelpersModel> {
     if called.is_empty() {
         return None;
@@ -48,7 +49,7 @@ pub(crate) fn fit(called: &[Called]) -> Option<HelpersModel> {
                 }
             };
             BOXES_PER_THREAD.iter().for_each(|&boxes_per_thread| attempt(HelpersModel { boxes_per_thread, ..before }));
-            // Together: a dearer call looks like a later helper.
+            // Together: a more expensive call looks like a later helper.
             for call_cycles in CALL_CYCLES {
                 LATE_SHARES.iter().for_each(|&late_share| attempt(HelpersModel { call_cycles, late_share, ..before }));
             }

@@ -1,4 +1,4 @@
-//! What the physical terms leave unexplained, as a function of the load: a Gaussian process with inducing points.
+//! The part of a time that the physical terms leave unexplained, as a function of the load: a Gaussian process with inducing points.
 
 use crate::data::Profile;
 use anyhow::{Context, Result};
@@ -9,24 +9,23 @@ use sapwise_scenes::Random;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Standard deviation of a residual, and of a timing around it, as natural logarithms. Neither half nor twice of them changes a regret by more than two
-/// fits to the same reports differ.
+/// Standard deviation of a residual, and of a timing around it, as natural logarithms. Half or twice as much changes no regret noticeably.
 const DEVIATION_LN: f64 = 0.2;
 const NOISE_LN: f64 = 0.08;
-/// A timing that lies this many times behind the best counts no less than one that lies further behind: nobody chooses the algorithm there.
+/// Time over the best of the point from which on a timing counts no less for lying further behind.
 const MOST_BEHIND: f64 = 4.0;
-/// A variance of its own that each place has, as a share: it keeps the weights of places that lie near each other from growing against each other.
+/// Variance that each place has of its own, as a share. It keeps the weights of neighbouring places from growing against each other.
 const JITTER: f64 = 1e-4;
-/// Loads that places are looked for among.
+/// Loads among which places are chosen, at most.
 const MOST_LOADS: usize = 1500;
-/// Timings that a residual is fitted to: more tell little more.
+/// Timings that a residual is fitted to, at most.
 const MOST_ROWS: usize = 2000;
-/// A timing further off than so many robust standard deviations, and than this logarithm, counts as one that far off: a disturbed measurement, or what no
-/// smooth residual can tell.
+/// A remainder beyond this many robust standard deviations, and beyond this logarithm, is cut to that: a disturbed measurement, or what no
+/// smooth residual can follow.
 const REACH: f64 = 3.0;
 const LEAST_REACH_LN: f64 = 0.6;
 
-/// One timing, as a residual sees it.
+/// One timing, for a residual.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Remainder {
     pub(crate) load: Load,
@@ -34,20 +33,17 @@ pub(crate) struct Remainder {
     pub(crate) ln: f64,
     /// Time over the best of the point.
     pub(crate) behind: f64,
-    /// Whether other programs were at work.
-    pub(crate) contended: bool,
 }
 
-/// Standard deviation of the logarithm of a timing that lies so many times behind the best of its point, around what its load tells.
+/// Returns the standard deviation of the logarithm of a timing around its residual, from its time over the best of the point.
 pub(crate) fn noise_ln(behind: f64) -> f64 {
     NOISE_LN * behind.min(MOST_BEHIND)
 }
 
-/// The places that tell most about the loads of the profiles that are chosen, each next one where those before tell least: a pivoted Cholesky
-/// decomposition of the covariance (Fine and Scheinberg, Efficient SVM training using low-rank kernel representations, 2001). The first few of them are
-/// therefore the best few.
+/// Chooses the places that tell most about the loads of the profiles, each next one where the previous ones tell least: a pivoted Cholesky
+/// decomposition of the covariance (Fine and Scheinberg, Efficient SVM training using low-rank kernel representations, 2001).
 pub(crate) fn places<'a>(profiles: impl Iterator<Item = &'a Profile>, without: Option<&str>) -> Arc<Places> {
-    // Profiles of one seed have the same scenes, and so the same loads.
+    // Profiles of one seed have the same scenes and loads.
     let mut loads: BTreeMap<(&str, u32), Load> = BTreeMap::new();
     for spot in profiles.flat_map(|p| &p.points).filter(|s| Some(s.scenario.as_str()) != without) {
         loads.entry((&spot.scenario, spot.load.objects)).or_insert(spot.load);
@@ -79,7 +75,7 @@ pub(crate) fn places<'a>(profiles: impl Iterator<Item = &'a Profile>, without: O
     Arc::new(Places::new(chosen))
 }
 
-/// Weights of the places under which remainders like these are most likely.
+/// Returns the most likely weights of the places for these remainders.
 ///
 /// # Errors
 /// When the system can't be solved.
@@ -93,10 +89,7 @@ pub(crate) fn weights(places: &Places, remainders: &[Remainder], by_motion: bool
     for (row, r) in likeness.rows_mut().into_iter().zip(&rows) {
         row.into_iter().zip(places.likeness(&r.load, by_motion)).for_each(|(to, k)| *to = k);
     }
-    let precision = Array1::from_iter(rows.iter().map(|r| {
-        let noise = noise_ln(r.behind) * if r.contended { 2.0 } else { 1.0 };
-        noise.powi(-2)
-    }));
+    let precision = Array1::from_iter(rows.iter().map(|r| noise_ln(r.behind).powi(-2)));
     let targets = Array1::from_iter(rows.iter().map(|r| r.ln.clamp(-reach, reach)));
     let mut between = Array2::zeros((count, count));
     for (mut row, load) in between.rows_mut().into_iter().zip(places.loads()) {
@@ -113,6 +106,7 @@ pub(crate) fn weights(places: &Places, remainders: &[Remainder], by_motion: bool
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data::Spot;
     use crate::synthetic::Machine;
     use sapwise::Residual;
 
@@ -140,11 +134,8 @@ mod tests {
         let truth = |l: &Load| {
             0.3 * (f64::from(l.objects).log2() / 4.0).sin() + 0.1 * (l.pairs / f64::from(l.objects)).min(1.0)
         };
-        let mut remainders: Vec<Remainder> = all[0]
-            .points
-            .iter()
-            .map(|s| Remainder { load: s.load, ln: truth(&s.load), behind: 1.0, contended: false })
-            .collect();
+        let remainder = |s: &Spot| Remainder { load: s.load, ln: truth(&s.load), behind: 1.0 };
+        let mut remainders: Vec<Remainder> = all[0].points.iter().map(remainder).collect();
         let residual = |r: &[Remainder]| Residual::new(Arc::clone(&found), weights(&found, r, false).unwrap(), false);
         let worst = |residual: &Residual| {
             let off = all[0].points.iter().map(|s| (residual.ln(&s.load) - truth(&s.load)).abs());

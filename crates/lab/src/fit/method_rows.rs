@@ -1,4 +1,4 @@
-//! The rows of each method, of many profiles a few each.
+//! The rows of each method, a few of each profile when there are many.
 
 use super::rows::{Row, rows};
 use crate::data::Profile;
@@ -6,18 +6,17 @@ use rayon::prelude::*;
 use sapwise::BackendClass;
 use std::collections::BTreeMap;
 
-/// Rows of a method, about. Its dozen coefficients need no more, and a fit takes time in proportion to them: of many reports each
-/// adds a few rows, other ones than the next.
+/// Rows of a method, about. Its dozen coefficients need no more, and the time of a fit is proportional to them.
 const MOST_ROWS: usize = 6000;
-/// Rows of a method for each profile at least.
+/// Rows of a method that each profile adds at least.
 const FEWEST_OF_PROFILE: usize = 2;
 
-/// Of each method on a class of processor the rows on one thread, or on GPUs, and those on several threads.
+/// For each method on a class of processor the rows on one thread, or on GPUs, and those on several threads.
 type MethodRows = BTreeMap<(BackendClass, String), [Vec<Row>; 2]>;
 
-/// The rows of all profiles, thinned where there are many.
+/// Returns the rows of all profiles, thinned when there are many.
 pub(super) fn rows_by_method(profiles: &[Profile]) -> MethodRows {
-    // Of so many that not each can add the fewest rows, some add them, spread over all.
+    // If not every profile can add rows, some spread over all do.
     let step = (profiles.len() * FEWEST_OF_PROFILE).div_ceil(MOST_ROWS).max(1);
     let most = (MOST_ROWS / profiles.len().max(1)).max(FEWEST_OF_PROFILE);
     let of_profile = |(k, profile): (usize, &Profile)| -> MethodRows {
@@ -39,7 +38,7 @@ pub(super) fn rows_by_method(profiles: &[Profile]) -> MethodRows {
     all
 }
 
-/// At most so many of the rows, evenly spaced, from a place that differs with `turn`.
+/// Returns at most `most` of the rows, evenly spaced, others for each `turn`.
 pub(crate) fn thinned(rows: Vec<Row>, most: usize, turn: usize) -> Vec<Row> {
     let all = rows.len();
     if all <= most {

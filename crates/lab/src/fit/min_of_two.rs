@@ -1,29 +1,29 @@
-//! Costs of an algorithm that falls back to another one where that is cheaper: the less of two costs.
+//! The cost of an algorithm that falls back to another one when that is cheaper: the smaller of two costs.
 
 use crate::fit::robust::{Problem, weighted_median};
 use ndarray::Array1;
 
-/// Rounds of telling which rows fell back; the answer stands still after two or three.
+/// Rounds of deciding which rows fell back. The answer stands still after two or three.
 const ROUNDS: usize = 4;
-/// Logarithm of the time over that of the fallback within which a row is first taken to have fallen back.
+/// A row is first assumed to have fallen back if the logarithm of its time over that of the fallback is within this.
 const LIKE: f64 = 0.2;
-/// What falling back costs over the algorithm itself, where no row did: what a look at the boxes costs.
+/// Cost of falling back over that of the other algorithm, when no row shows it: it looks at the boxes once more.
 const USUAL_FACTOR: f64 = 1.05;
-/// Bounds of that factor. What falls back does at least what it falls back to, and beyond the other bound it is not that algorithm.
+/// Bounds of that factor. Falling back costs no less than the other algorithm, and a row above the upper bound did not fall back.
 const FACTORS: (f64, f64) = (1.0, 1.5);
 
-/// What was fitted.
+/// The fit.
 #[derive(Debug, Clone)]
 pub(crate) struct MinOfTwo {
     /// Units of the terms of the algorithm's own method.
     pub(crate) units: Vec<f64>,
-    /// Cost of the fallback over that of the algorithm that it is.
+    /// Cost of falling back over that of the other algorithm.
     pub(crate) factor: f64,
 }
 
 impl MinOfTwo {
-    /// Fits the own terms to the rows that did not fall back, and a factor to the others. `other_ns` is for each row what the algorithm costs
-    /// that is fallen back to.
+    /// Fits the own terms to the rows that did not fall back, and a factor to the others. `other_ns` is the cost of the other algorithm in
+    /// each row.
     ///
     /// A sum of the terms of both would charge every frame for both. A row that fell back is a lower bound for the own terms.
     pub(crate) fn fit(problem: &Problem, other_ns: &[f64]) -> Self {
@@ -44,7 +44,7 @@ impl MinOfTwo {
             if now == other {
                 break;
             }
-            // Where all rows fell back there is nothing to fit the own terms to.
+            // If all rows fell back, there is nothing to fit the own terms to.
             if now.iter().zip(&problem.floors).all(|(other, floor)| *other || *floor) {
                 break;
             }
@@ -53,7 +53,7 @@ impl MinOfTwo {
         found
     }
 
-    /// What each row costs.
+    /// Returns the modelled cost of each row.
     pub(crate) fn modelled(&self, problem: &Problem, other_ns: &[f64]) -> Array1<f64> {
         let mut modelled = problem.terms.dot(&Array1::from(self.units.clone()));
         modelled.iter_mut().zip(other_ns).for_each(|(first, other)| *first = first.min(self.factor * other));
@@ -77,7 +77,6 @@ mod tests {
             ns: (0..60).map(|k| first(k).min(1.1 * other[k])).collect(),
             weights: vec![1.0; 60],
             floors: vec![false; 60],
-            groups: vec![0; 60],
         };
         let found = MinOfTwo::fit(&problem, &other);
         assert!((found.factor - 1.1).abs() < 0.01, "{found:?}");

@@ -1,21 +1,24 @@
 //! Cost terms fitted to the times of profiles.
 
 pub(crate) mod columns;
+mod design;
 mod designs;
 mod late_helpers;
-pub(crate) mod load_residual;
+mod load_residual;
 mod measured_costs;
+mod measured_tuning;
 mod method_rows;
 mod min_of_two;
 mod model;
-pub(crate) mod nnls;
-pub(crate) mod robust;
+mod nnls;
+mod robust;
 mod rows;
 mod terms;
 mod weights;
 
-pub use designs::{ComponentsOf, Designs, Fitted, TrainingSet};
-pub use measured_costs::{measured_costs, measured_costs_over, measured_slice, measured_tuning, slice_tuning};
+pub use designs::{Designs, Fitted, TrainingSet};
+pub use measured_costs::measured_costs;
+pub use measured_tuning::{measured_slice, measured_tuning, slice_tuning};
 pub(crate) use method_rows::thinned;
 pub use model::model;
 pub use rows::{Row, rows};

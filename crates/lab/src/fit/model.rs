@@ -1,13 +1,12 @@
-//! Puts a model together from the profiles that it is trained on.
+//! A model, fitted to profiles.
 
 use super::designs::{Designs, Fitted, TrainingSet};
 use crate::data::{COMPARED, COMPARED_OF_GPUS, Profile, is_real};
-use crate::report::Label;
 use anyhow::{Result, bail};
 use sapwise::model::{GPU_PREFIX, Range};
 use sapwise::{Backend, GpuHardware, Model};
 
-/// A model of what is chosen of the profiles, and in sentences what was left out and why.
+/// Fits a model to the chosen profiles. Returns it with sentences on what was left out and why.
 ///
 /// # Errors
 /// When no method could be fitted, or a regression fails.
@@ -20,16 +19,15 @@ pub fn model(
     let Fitted { methods, places, notes } = designs.fit(training)?;
     let profiles: Vec<&Profile> =
         profiles.iter().zip(training.profiles).filter(|(_, chosen)| **chosen).map(|(p, _)| p).collect();
-    let mut model = Model::new(name, methods, ranges(&profiles)).with_places(places);
-    model.simulated = profiles.iter().any(|p| p.label == Label::Simulated);
+    let model = Model::new(name, methods, ranges(&profiles)).with_places(places);
     if let Some(defect) = model.defect() {
         bail!("no model could be fitted: {}", [vec![defect.to_string()], notes].concat().join("; "));
     }
     Ok((model, notes))
 }
 
-/// Where the parameters lie in the profiles that have them: those of the machine, then those of the GPUs that were timed. Where some of these are real, software
-/// adapters have no part in what is fitted, and none in the ranges: between them and one card any other would pass for known.
+/// Returns the ranges of the parameters of machines, then of the GPUs that were timed. Software adapters count only if there is no real
+/// GPU: between them and one card any other would pass for known.
 fn ranges(profiles: &[&Profile]) -> Vec<Range> {
     let machine = COMPARED
         .into_iter()
@@ -50,7 +48,7 @@ fn range(parameter: String, values: Vec<f64>) -> Option<Range> {
     Some(Range { parameter, min, max })
 }
 
-/// The GPUs of a profile that an algorithm was timed on.
+/// Returns the GPUs of a profile that an algorithm was timed on.
 fn timed_gpus(profile: &Profile) -> impl Iterator<Item = &GpuHardware> {
     let used = |k: u32| {
         let on = |backend: &Backend| matches!(backend, Backend::Gpu(list) if list.contains(&k));

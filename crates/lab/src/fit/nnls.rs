@@ -3,15 +3,14 @@
 use linfa_linalg::qr::QRInto;
 use ndarray::{Array1, Array2, ArrayView1, Axis, concatenate, s};
 
-/// The share of a column that must not lie in the span of the others before it may join them.
+/// Length outside the span of the active columns that a column of length one needs to join them.
 const INDEPENDENT: f64 = 1e-7;
 
 /// Minimises `|a x - b|` over `x >= 0` by the active-set method of Lawson and Hanson (Solving Least Squares Problems, 1974,
 /// chapter 23), for `a` of shape (rows, columns) and `b` of length rows.
 ///
-/// Columns are scaled to length one first, since terms differ by many orders of magnitude. A column that depends linearly
-/// on those in use stays at zero, the earlier column first, so that rank-deficient input has one answer. Columns of zeros
-/// get zero. Ends after ten changes of the active set for each column, with the best admissible point so far.
+/// Scales columns to length one first, since terms differ by many orders of magnitude. A column that depends linearly on earlier ones in
+/// use stays at zero, so that rank-deficient input has one answer. Ends after ten changes of the active set for each column.
 pub(crate) fn nnls(a: &Array2<f64>, b: &Array1<f64>) -> Array1<f64> {
     let columns = a.ncols();
     let lengths: Vec<f64> = a.columns().into_iter().map(|c| c.dot(&c).sqrt()).collect();
@@ -25,7 +24,7 @@ pub(crate) fn nnls(a: &Array2<f64>, b: &Array1<f64>) -> Array1<f64> {
     let tolerance = 1e-12 * b.dot(b).sqrt();
     let mut x = Array1::<f64>::zeros(columns);
     let mut active: Vec<usize> = Vec::new();
-    // Columns that can't join the present active set, asked again whenever it shrinks.
+    // Columns that can't join the present active set. They are tried again when it shrinks.
     let mut barred: Vec<bool> = lengths.iter().map(|&l| l == 0.0).collect();
     for _ in 0..10 * columns {
         let gradient = scaled.t().dot(&(b - &scaled.dot(&x)));
@@ -46,9 +45,8 @@ pub(crate) fn nnls(a: &Array2<f64>, b: &Array1<f64>) -> Array1<f64> {
     x
 }
 
-/// The same problem in as few rows as there are columns and one more: the triangle of a QR decomposition keeps every length and angle, so
-/// the solutions over any columns are the same. The search asks for dozens of those, and over tens of thousands of rows each would take a
-/// hundred times as long.
+/// Reduces the problem to as many rows as it has columns, and one more: the triangle of a QR decomposition keeps every length and angle, so
+/// that the solutions over any columns stay. The search solves dozens of these, which would be slow over thousands of rows.
 fn reduced(a: Array2<f64>, b: &Array1<f64>) -> (Array2<f64>, Array1<f64>) {
     let columns = a.ncols();
     if a.nrows() <= columns + 1 {
@@ -60,12 +58,12 @@ fn reduced(a: Array2<f64>, b: &Array1<f64>) -> (Array2<f64>, Array1<f64>) {
             let triangle = decomposed.into_r();
             (triangle.slice(s![.., ..columns]).to_owned(), triangle.column(columns).to_owned())
         }
-        // Neither can happen: the columns are as long as the rows are many, and there are more rows than columns.
+        // Never: the shapes fit, and there are more rows than columns.
         None => (a, b.clone()),
     }
 }
 
-/// The column along which the error falls fastest; the first of equals.
+/// Returns the column along which the error falls fastest; the first of equals.
 fn steepest(gradient: &Array1<f64>, active: &[usize], barred: &[bool], tolerance: f64) -> Option<usize> {
     let mut best: Option<usize> = None;
     for (k, &slope) in gradient.iter().enumerate() {
@@ -78,7 +76,7 @@ fn steepest(gradient: &Array1<f64>, active: &[usize], barred: &[bool], tolerance
 }
 
 /// Moves `x` towards the unconstrained `solution` over the active columns, dropping those that reach zero on the way, until
-/// the solution over the remaining ones is positive. Whether any was dropped.
+/// the solution over the remaining ones is positive. Returns whether it dropped any.
 fn retreat(a: &Array2<f64>, b: &Array1<f64>, solution: Vec<f64>, active: &mut Vec<usize>, x: &mut Array1<f64>) -> bool {
     let mut z = solution;
     let mut dropped = false;
@@ -104,7 +102,7 @@ fn retreat(a: &Array2<f64>, b: &Array1<f64>, solution: Vec<f64>, active: &mut Ve
     dropped
 }
 
-/// Least squares over some columns by Gram-Schmidt, each column cleared twice; `None` when they are linearly dependent.
+/// Solves least squares over some columns by Gram-Schmidt, each column cleared twice; `None` when they are linearly dependent.
 fn solve(a: &Array2<f64>, b: &Array1<f64>, active: &[usize]) -> Option<Vec<f64>> {
     let count = active.len();
     let mut base: Vec<Array1<f64>> = Vec::with_capacity(count);

@@ -17,23 +17,23 @@ pub struct Row {
     pub load: Load,
     /// Median over the frames.
     pub ns: f64,
-    /// Time over the best of the point, of a lower bound that bound over it.
+    /// That time over the best of the point.
     pub behind: f64,
-    /// The time is a lower bound: the algorithm had left the race before this point.
+    /// The time is a lower bound: the algorithm had left the sweep before this point.
     pub floor: bool,
 }
 
-/// An algorithm that left the race is taken to be at least this many times slower than the best at larger sizes, or half as many
-/// times as it last was: it may gain a little on a best that outgrows its caches.
+/// An algorithm that left the sweep is assumed to be at least this many times slower than the best at larger sizes, or half as many times as
+/// it last was: it may gain a little on a best that outgrows its caches.
 const LEFT_BEHIND: f64 = 2.0;
 
-/// One row for each algorithm and point, and a lower bound for each point of a scenario beyond the last at which an algorithm
-/// was timed. `position` is noted in the rows as that of the profile.
+/// Returns a row for each algorithm and point, and a lower bound for each point of a scenario beyond the last at which an algorithm was
+/// timed. `position` is that of the profile.
 pub fn rows(profile: &Profile, position: usize) -> Vec<Row> {
     let mut rows = Vec::new();
     for (algorithm, timed) in profile.algorithms.iter().enumerate() {
         let algorithm = algorithm as u16;
-        // For each scenario the sizes at which it was timed, and how many times slower than the best it was there.
+        // The time over the best at each size of each scenario.
         let mut ratios: BTreeMap<&str, BTreeMap<u32, f64>> = BTreeMap::new();
         let row = |(k, spot): (usize, &Spot), best: f64, behind: f64, floor: bool| Row {
             profile: position,
@@ -50,8 +50,8 @@ pub fn rows(profile: &Profile, position: usize) -> Vec<Row> {
             ratios.entry(&spot.scenario).or_default().insert(spot.load.objects, ns / best);
         }
         let on_gpu = timed.id.backend().class() == BackendClass::Gpu;
-        // A GPU has a large fixed cost: it starts far behind and gains. One that left the race while it gained, for want of
-        // time, may be ahead beyond.
+        // A GPU has a large fixed cost: it starts far behind and gains. One that left while it gained, because time ran out, may be
+        // ahead at larger sizes.
         ratios.retain(|_, course| !(on_gpu && gains(course)));
         let last: BTreeMap<&str, (u32, f64)> = ratios
             .iter()
@@ -67,7 +67,7 @@ pub fn rows(profile: &Profile, position: usize) -> Vec<Row> {
     rows
 }
 
-/// Whether an algorithm came nearer to the best from the last size but one to the last.
+/// Returns whether an algorithm came nearer to the best from the last size but one to the last.
 fn gains(course: &BTreeMap<u32, f64>) -> bool {
     let mut from_the_last = course.values().rev();
     matches!((from_the_last.next(), from_the_last.next()), (Some(last), Some(before)) if last < before)

@@ -1,9 +1,9 @@
-//! What the time of a method may consist of.
+//! The terms of the time of a method.
 
 use sapwise::model::Scale;
 use sapwise::{BackendClass, Term};
 
-/// Counts of a frame that have one unit together: how often each, of which term and scale.
+/// Counts of a frame that share one unit: a factor, a term and a scale each.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Component(pub Vec<(f64, Term, Scale)>);
 
@@ -14,38 +14,38 @@ impl Component {
     }
 }
 
-/// What a method tests. The tests of the other methods are left out: within one machine they correlate with its own, and would
-/// grow differently beyond the sizes that were measured.
+/// Returns the terms that count the box pairs that a method tests. The tests of other methods are left out: they correlate with its own on
+/// one machine, and would grow differently beyond the measured sizes.
 fn tests(method: &str) -> &'static [Term] {
     match method {
         "brute" => &[Term::AllPairs],
         "sap" => &[Term::AxisCandidates],
         "grid-sap" => &[Term::StripCandidates],
-        // A tree tests what is near, which objects and pairs tell. Kept pairs are tested one by one, and found again in few frames.
+        // A tree tests in proportion to objects and pairs. Cached pairs are tested one by one, and found again in few frames.
         "bvh" | "pair-cache" => &[],
         _ => &[Term::AllPairs, Term::AxisCandidates, Term::StripCandidates],
     }
 }
 
-/// The method that another one falls back to where that is cheaper: a tree takes over where boxes move too far for kept pairs.
+/// Returns the method that another one falls back to when that is cheaper: a tree, when boxes move too far for cached pairs.
 pub fn fallback_method(method: &str) -> Option<&'static str> {
     (method == "pair-cache").then_some("bvh")
 }
 
-/// Whether the boxes are sorted in every frame. `pair-cache` sorts them in few, or where the tree takes over.
+/// Returns whether a method sorts the boxes in every frame. `pair-cache` sorts them in few, or when the tree takes over.
 fn sorts(method: &str) -> bool {
     !matches!(method, "brute" | "pair-cache")
 }
 
-/// Whether a frame may be cheaper where boxes move little.
+/// Returns whether a frame may be cheaper when boxes move little.
 pub(crate) fn is_incremental(method: &str) -> bool {
     !matches!(method, "brute" | "sap" | "grid-sap" | "bvh")
 }
 
-/// What the time of a method may consist of over machines, on one thread or on any number of GPUs.
+/// Returns the components of the time of a method, on one thread or on any number of GPUs.
 ///
-/// Of components that can't be told apart the first one is used, so that the order matters where all machines are alike: work of
-/// the lanes before work of the cycles, the GPU's work before that of the CPU for it.
+/// Of components that can't be distinguished the first one is used. So the order matters when all machines are alike: lanes before cycles,
+/// the work of the GPU before that of the CPU for it.
 pub fn components(method: &str, class: BackendClass) -> Vec<Component> {
     match class {
         BackendClass::Cpu => on_cpu(method).into_iter().map(|(term, scale)| Component::of(term, scale)).collect(),

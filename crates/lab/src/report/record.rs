@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 /// The hardware parameters of a machine and the raw timings of every algorithm on it.
 ///
-/// Facts only: cost curves, crossovers and tuning is derived from it and never stored in it.
+/// Facts only: cost curves, crossovers and tunings are derived from it and never stored in it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub struct Report {
@@ -20,10 +20,9 @@ pub struct Report {
     pub hardware: Hardware,
     /// The algorithms that were timed.
     pub algorithms: Vec<Timed>,
-    /// Where and what was timed, round after round of each scenario; within a round the sizes ascend. Empty for
-    /// `--hardware-only`.
+    /// What was timed where, round after round of each scenario, the sizes of a round ascending. Empty with `--hardware-only`.
     pub points: Vec<Point>,
-    /// Whether the measurement was cut short, and what went wrong on the way. Empty when all went well.
+    /// Whether the measurement was cut short, and what went wrong. Empty when all went well.
     pub remarks: Vec<String>,
 }
 
@@ -35,12 +34,10 @@ pub enum Label {
     RealFull,
     /// A real machine with fewer threads or a lower SIMD level than it has.
     RealRestricted,
-    /// A real machine while other programs load it.
+    /// A real machine that other programs disturbed.
     RealContended,
     /// A real machine whose GPU is a software adapter on its CPU.
     RealSoftwareGpu,
-    /// Made up from a specification. Never evidence of accuracy.
-    Simulated,
     /// Parameters from a publication, without timings.
     Published,
 }
@@ -57,14 +54,14 @@ pub struct Provenance {
     pub command: String,
     /// Seed of the scenarios.
     pub seed: u64,
-    /// Threads that the profile allows; `None` when it allows all.
+    /// Threads that `--threads` allowed; `None` without it.
     pub threads: Option<u32>,
-    /// SIMD level that was forced; `None` when it was not.
+    /// SIMD level that was forced; `None` when none was.
     pub simd: Option<String>,
-    /// Threads of lavapipe, a software adapter, where `LP_NUM_THREADS` sets them and it is among the GPUs.
+    /// Threads of the software adapter lavapipe, if it is among the GPUs and `LP_NUM_THREADS` sets them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gpu_threads: Option<u32>,
-    /// What was taken from the machine for this report; `None` where nothing was.
+    /// What was taken from the machine for this report; `None` when nothing was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub restriction: Option<Restriction>,
     /// Whether the program was built with optimisation. Timings of a debug build are refused by `train`.
@@ -77,9 +74,9 @@ pub struct Provenance {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub struct Restriction {
-    /// Each thing that was taken, once.
+    /// What was taken, each kind once.
     pub kinds: Vec<Restricted>,
-    /// One entry for each parameter that must show one of them. Nothing for a kind without a report to compare with.
+    /// One entry for each parameter that must show it. Empty when there was no report to compare with.
     pub proof: Vec<Proof>,
 }
 
@@ -110,9 +107,9 @@ pub struct Proof {
     /// The GPU of this report whose parameter it is; `None` for one of the CPU.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gpu: Option<u32>,
-    /// Its value where this thing was not taken and all else was the same. `None` when it is missing there.
+    /// Its value in the report without this restriction. `None` when it is missing there.
     pub without: Option<f64>,
-    /// Its value in this report. `None` when it is missing.
+    /// Its value in this report. `None` when it is missing here.
     pub with: Option<f64>,
     /// Whether that shows the restriction.
     pub shows: bool,
@@ -126,18 +123,18 @@ pub struct Timed {
     pub id: AlgorithmId,
     /// Its revision at the time.
     pub revision: u32,
-    /// What its time consists of, where its author says so: a cost model is fitted with these terms then. Empty for the usual ones.
+    /// The terms that its author named; a cost model is fitted with them. Empty for the usual terms.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub terms: Vec<TimedTerm>,
 }
 
-/// One term of a time: a count of the load, and what of the hardware one of it costs.
+/// One term of a time: a count of the load, and the hardware parameter that it scales with.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub struct TimedTerm {
     /// What is counted.
     pub term: Term,
-    /// What of the hardware one of it costs.
+    /// What one of it costs.
     pub scale: Scale,
 }
 
@@ -147,21 +144,21 @@ pub struct TimedTerm {
 pub struct Point {
     /// Name of the scenario.
     pub scenario: String,
-    /// Mean load of the timed frames, each as an in-line choice would have estimated it, with the pairs of the frame before.
+    /// Mean load of the timed frames, each as a program estimates it, with the pairs of the previous frame.
     pub load: Load,
     /// Pairs in the last frame.
     pub pairs: u64,
     /// [`Pairs::fingerprint`](sapwise::Pairs::fingerprint) of the last frame, equal for every algorithm, as 16 hex digits.
     pub fingerprint: String,
-    /// Highest share of the CPU, 0 to 1, that other programs took while these samples were taken. `None`: can't be told.
+    /// Highest share of the CPU, 0 to 1, that other programs took meanwhile. `None` when the system does not report it.
     pub foreign_load: Option<f64>,
-    /// Frames that were thrown away because foreign load spoiled them.
+    /// Frames that were dropped because of foreign load.
     pub spoiled: u32,
-    /// [`ParameterId::CoreToCoreNs`](sapwise::ParameterId::CoreToCoreNs) before and after the samples. A hypervisor that moves the
-    /// cores of a guest changes it, and with it what several threads gain. Absent on one core and in old reports.
+    /// [`ParameterId::CoreToCoreNs`](sapwise::ParameterId::CoreToCoreNs) before and after the samples. It changes when a hypervisor
+    /// moves the cores of a guest, and with it the speed-up of several threads. Absent on one core.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub core_to_core_ns: Option<[f64; 2]>,
-    /// The timings, one entry for each algorithm that was still in the race.
+    /// One entry for each algorithm that had not left the sweep.
     pub timings: Vec<Timing>,
 }
 
@@ -171,16 +168,16 @@ pub struct Point {
 pub struct Timing {
     /// The algorithm.
     pub algorithm: AlgorithmId,
-    /// Wall clock of each frame from boxes in memory to pairs in memory. The k-th sample of every algorithm at a point is
-    /// the k-th frame, so samples can be compared in pairs. One that was surely beaten has fewer than the others: it rested from
-    /// then on.
+    /// Wall clock of each frame from boxes in memory to pairs in memory. The k-th sample of every algorithm at a point is the same
+    /// frame. An algorithm that was clearly beaten has fewer samples: it stopped early.
     pub samples_ns: Vec<u64>,
-    /// Why there are no samples, where there are none.
+    /// Why there are no samples. Absent when there are any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
 }
 
 impl Timed {
-    /// An algorithm with the usual terms of its method.
+    /// Makes an entry with the usual terms of the method.
     #[must_use]
     pub fn new(id: AlgorithmId, revision: u32) -> Self {
         Self { id, revision, terms: Vec::new() }
@@ -200,20 +197,20 @@ impl std::fmt::Display for Restricted {
 }
 
 impl Report {
-    /// Whether it was cut short, as its remarks say.
+    /// Returns whether the measurement was cut short, as the remarks say.
     #[must_use]
     pub fn is_unfinished(&self) -> bool {
         self.remarks.iter().any(|remark| Self::is_cut_short(remark))
     }
 
-    /// Whether a remark says that the measurement was cut short.
+    /// Returns whether a remark says that the measurement was cut short.
     #[must_use]
     pub fn is_cut_short(remark: &str) -> bool {
         remark.starts_with("unfinished") || remark.starts_with("interrupted")
     }
 
-    /// The share of the CPU, 0 to 1, that other programs took at half of the points, or of the parameters where there are no points. `None` where it
-    /// can't be told.
+    /// Returns the median share of the CPU, 0 to 1, that other programs took, over the points or, without points, over the parameters.
+    /// `None` when the system does not report it.
     #[must_use]
     pub fn foreign_load(&self) -> Option<f64> {
         let mut loads: Vec<f64> = self.points.iter().filter_map(|p| p.foreign_load).collect();
@@ -223,7 +220,7 @@ impl Report {
         median(&loads)
     }
 
-    /// What makes this report unusable, if anything.
+    /// Returns what makes this report unusable, if anything.
     #[must_use]
     pub fn defect(&self) -> Option<String> {
         if let Some(defect) = self.hardware.defect() {

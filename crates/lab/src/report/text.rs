@@ -6,19 +6,19 @@ use sapwise::json::{Error, Format, Read};
 /// Files of reports.
 pub const FORMAT: Format = Format::new("report", 2);
 
-/// Reads a report and checks its figures. Keys that this version does not know, in a file of a newer one, are in the answer.
+/// Reads a report and checks its numbers. The answer names the keys of a newer minor version that were skipped.
 ///
 /// # Errors
-/// The place of the defect, or the schema where it is none of ours.
+/// Names the place of the defect, or the schema if it is another one.
 pub fn read(text: &str) -> Result<Read<Report>, Error> {
     FORMAT.read::<Report>(text)?.checked(Report::defect)
 }
 
 /// Writes a report: one key a line, one point a line, and the raw samples of a parameter on one line, so that a full sweep stays
-/// readable and under a megabyte.
+/// readable and below a megabyte.
 ///
 /// # Errors
-/// When a figure can't be written.
+/// When a number can't be written.
 pub fn write(report: &Report) -> Result<String, Error> {
     let frame = one_line_samples(&FORMAT.write(&Report { points: Vec::new(), ..report.clone() })?);
     if report.points.is_empty() {
@@ -31,7 +31,7 @@ pub fn write(report: &Report) -> Result<String, Error> {
     Ok(frame.replacen("\n  \"points\": []", &points, 1))
 }
 
-/// The same text with each list of raw samples on the line of its key.
+/// Puts each list of raw samples on the line of its key.
 fn one_line_samples(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut inside = false;
