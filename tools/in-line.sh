@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Measures what the adaptive choice is worth on this machine: its time over that of the best single algorithm and over an oracle's, with tuning that
-# was predicted, measured, or of another machine, and beside another program.
+# was predicted, measured, or of another machine.
 #
 #     tools/in-line.sh [DIR] [OTHER.json]
 #
@@ -30,24 +30,19 @@ stream=$folder/rapier3d.npy
 [ -s "$folder/pooled.npy" ] || cargo run --quiet --release -p sapwise-scenes --example streams -- "$folder" >/dev/null
 
 summary=$folder/summary.txt
-printf '%-28s %6s  %8s  %8s  %s\n' run single regret windows 'worst frame' >"$summary"
-# One name, then the scene and what differs. With `--after` the row has the regrets and the worst frame of the frames behind that.
+printf '%-28s %8s %8s  %10s  %s\n' run single windows p99 'worst frame' >"$summary"
+# A name, then the scene and its options. With `--after` the row is that of the frames behind it.
 run() {
-    local name=$1 single regret windows worst
+    local name=$1
     shift
     "$sapwise" run "$@" --no-gpus --plot "$folder/$name.svg" --trace "$folder/$name.csv" >"$folder/$name.txt"
-    single=$(sed -n 's/^Adaptive takes \([0-9.]*\) .*/\1/p' "$folder/$name.txt")
-    # frames, regret, median of repeats, their quartiles, vs windows, switches, explored, worst frame
-    read -r regret windows worst < <(awk -v after=" $* " '
-        /^frames +regret/ { table = 1; next }
-        !NF { table = 0 }
-        table && (after ~ / --after / || $1 == "all") { row = $0 }
-        END {
-            split(row, cell, / %[ a-z]*/)
-            sub(/.* /, "", cell[1]); sub(/.* /, "", cell[5]); sub(/ times.*/, "", row); sub(/.* /, "", row)
-            print cell[1], cell[5], row
-        }' "$folder/$name.txt")
-    printf '%-28s %6s  %6s %%  %6s %%  %s\n' "$name" "$single" "$regret" "$windows" "$worst" | tee -a "$summary"
+    # frames, × single, × oracle, then median, p99 and worst frame with a unit each, switches, explored
+    awk -v name="$name" -v after=" $* " '
+        /^frames +× single/ { table = 1; next }
+        table && (after ~ / --after / || $1 == "all") && /^(all|[0-9]+ to [0-9]+) / { sub(/^(all|[0-9]+ to [0-9]+) +/, ""); row = $0 }
+        table && !/^(all|[0-9.])/ { table = 0 }
+        END { split(row, c, / +/); printf "%-28s %8s %8s  %10s  %s\n", name, c[1], c[2], c[5] " " c[6], c[7] " " c[8] }' \
+        "$folder/$name.txt" | tee -a "$summary"
 }
 
 predicted=(--samples 8)
@@ -70,9 +65,7 @@ done
 run fragmentation-wrong fragmentation --frames 1200 --tuning "$other" --after 300
 run clustered-wrong clustered --swing 50 --frames 1200 --tuning "$other" --after 300
 run rapier3d-wrong "$stream" --tuning "$other" --after 300
-run fragmentation-shared fragmentation --frames 1500 "${measured[@]}" --co-runner 600 --after 900
-run uniform-shared uniform --objects 5000 --frames 1200 "${measured[@]}" --co-runner 600 --after 900
 
-awk 'NR > 1 && $1 !~ /-(wrong|shared)$/ { sum += log($2); n++; if ($2 > most) { most = $2; name = $1 } }
+awk 'NR > 1 && $1 !~ /-wrong$/ { sum += log($2); n++; if ($2 > most) { most = $2; name = $1 } }
     END { printf "\n%d undisturbed runs over the best single algorithm: geometric mean %.3f, most %.3f in %s\n", n, exp(sum / n), most, name }' \
     "$summary" | tee -a "$summary"

@@ -1,8 +1,9 @@
-//! Verbs that are killed at any moment, or run out of disk: every older file is whole, every newer one is complete, and the same command
-//! works again.
+//! Verbs that are killed at any moment, or run out of disk: older files stay whole, newer ones are complete, and the
+//! same command works again.
 //!
-//! `SAPWISE_KILLS=N` kills each verb N times, and `SAPWISE_SMALL_DISK=FOLDER` fills that disk: `tools/kills.sh` does both. Without it files
-//! end where the system's limit on their size does.
+//! `SAPWISE_KILLS=N` kills each verb N times, and `SAPWISE_SMALL_DISK=FOLDER` fills that disk: `tools/kills.sh` does
+//! both. Without a small disk the tests limit the size of files.
+#![cfg(feature = "long-tests")]
 
 mod common;
 
@@ -15,12 +16,20 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-/// How often each verb is killed where nothing is said.
+/// How often each verb is killed without `SAPWISE_KILLS`.
 const KILLS: u64 = 4;
 
-/// A path below the root of the repository.
-fn stored(name: &str) -> String {
-    format!("{}/../{name}", env!("CARGO_MANIFEST_DIR"))
+/// The reports of datasets/ whose paths contain a host and end in a profile, such as `full`.
+fn stored(host: &str, profile: &str) -> Vec<String> {
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../datasets"));
+    let is_wanted = |path: &PathBuf| {
+        let text = path.to_string_lossy();
+        let name = path.file_stem().unwrap().to_string_lossy();
+        text.contains(host) && !text.contains("earlier") && name.split("--").next().unwrap().ends_with(profile)
+    };
+    let mut found: Vec<PathBuf> = files(root).into_iter().filter(is_wanted).collect();
+    found.retain(|path| path.extension().is_some_and(|e| e == "json"));
+    found.into_iter().map(|path| path.display().to_string()).collect()
 }
 
 /// Numbers from 0 to 1 that follow from the first.
@@ -110,7 +119,8 @@ fn end_files_early(words: &[&str], out: &Path, before: &[PathBuf]) {
     let largest = before.iter().map(|path| fs::metadata(path).unwrap().len()).max().unwrap() as f64;
     for share in [0.0, 0.3, 0.6] {
         let mut command = Command::new("sh");
-        // Where the signal is not ignored it kills, which is the subject elsewhere. The limit is in blocks of 512 bytes.
+        // Where the signal is not ignored it kills, which is the subject elsewhere. The limit is in blocks of 512
+        // bytes.
         command.args(["-c", "trap '' XFSZ; ulimit -f $0; exec \"$@\"", &((largest * share) as u64 / 512).to_string()]);
         command.arg(assert_cmd::cargo::cargo_bin!("sapwise"));
         run_out_of_room(command.args(words).current_dir(out));
@@ -144,49 +154,42 @@ fn run_out_of_room(command: &mut Command) {
 fn end_files_early(_: &[&str], _: &Path, _: &[PathBuf]) {}
 
 #[test]
-fn a_study_that_is_killed_leaves_the_one_of_before() {
+fn a_study_that_is_killed_leaves_the_one_before() {
     let folder = tempfile::tempdir().unwrap();
-    let reports = [
-        stored("datasets/earlier/amd-epyc-2c-full--2026-11-21.json"),
-        stored("datasets/earlier/amd-epyc-2c-1t--2026-11-21.json"),
-    ];
+    let reports = [stored("zen3-2c", "full"), stored("zen5-2c", "full")].concat();
     kill_and_look(&["study", &reports[0], &reports[1], "--out", "study"], folder.path(), 1);
 }
 
 #[test]
-fn a_prediction_that_is_killed_leaves_the_tuning_of_before() {
+fn a_prediction_that_is_killed_leaves_the_tuning_before() {
     let folder = tempfile::tempdir().unwrap();
-    let report = stored("datasets/earlier/amd-epyc-2c-full--2026-11-21.json");
-    kill_and_look(
-        &["predict", "--no-gpus", "--report", &report, "--measured", "--out", "tuning.json"],
-        folder.path(),
-        2,
-    );
+    let report = &stored("zen3-2c", "full")[0];
+    let words = ["predict", "--no-gpus", "--report", report, "--measured", "--out", "tuning.json"];
+    kill_and_look(&words, folder.path(), 2);
 }
 
 #[test]
-fn a_run_that_is_killed_leaves_its_files_of_before() {
+fn a_run_that_is_killed_leaves_its_files_before() {
     let folder = tempfile::tempdir().unwrap();
-    let report = stored("datasets/intel-xeon-2c-full--2026-11-23.json");
+    let report = &stored("intel-xeon-2c", "full")[0];
     let words = "run uniform --objects 300 --frames 40 --repeats 2 --no-gpus --record r.npy --trace t.csv --plot p.svg --tuning";
     let words: Vec<&str> = words.split(' ').chain([report.as_str()]).collect();
     kill_and_look(&words, folder.path(), 3);
 }
 
 #[test]
-fn a_training_that_is_killed_leaves_the_model_of_before() {
+fn a_training_that_is_killed_leaves_the_model_before() {
     let folder = tempfile::tempdir().unwrap();
-    success(sapwise().args(["simulate", "--machines", "4", "--out", "simulated"]).current_dir(folder.path()));
-    let out = folder.path().join("out");
-    fs::create_dir(&out).unwrap();
-    let reports = folder.path().join("simulated").display().to_string();
-    let words =
-        ["train", "--simulated", &reports, "--out", "model.json", "--card", "card.md", "--plot", "held-out.png"];
-    kill_and_look(&words, &out, 4);
+    let reports = stored("2c", "full");
+    let words: Vec<&str> = ["train", "--out", "model.json", "--card", "card.md"]
+        .into_iter()
+        .chain(reports.iter().map(String::as_str))
+        .collect();
+    kill_and_look(&words, folder.path(), 4);
 }
 
 #[test]
-fn a_probe_that_is_killed_leaves_the_report_of_before() {
+fn a_probe_that_is_killed_leaves_the_report_before() {
     let folder = tempfile::tempdir().unwrap();
     let words = "probe --no-gpus --quick --scenario uniform --scenario slab --max-objects 10 --out report.json";
     kill_and_look(&words.split(' ').collect::<Vec<_>>(), folder.path(), 5);

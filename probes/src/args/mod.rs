@@ -17,7 +17,7 @@ use std::path::PathBuf;
 
 pub(crate) use fleet::Fleet;
 pub(crate) use part::{Part, PartKind};
-pub(crate) use probe::{Lifted, Probe};
+pub(crate) use probe::Probe;
 pub(crate) use run::{Run, Scene};
 pub(crate) use study::Study;
 

@@ -2,7 +2,7 @@
 
 use super::{Finding, Here, figures, privacy};
 use crate::gpus::{difference, uses};
-use crate::{date, restriction, revisions};
+use crate::{date, revisions};
 use sapwise_lab::report::{Label, Report};
 
 /// Most bytes of a report that goes into datasets/, which every clone of the repository takes along.
@@ -45,10 +45,8 @@ impl Here {
         }
         finding.doubts.extend(figures::doubts(report));
         finding.notes.extend(figures::suspicious(report));
-        let not_shown = report.provenance.restriction.as_ref().map_or(Vec::new(), restriction::not_shown);
-        let told = |remark: &&String| Report::is_cut_short(remark) || not_shown.contains(remark);
-        finding.notes.extend(report.remarks.iter().filter(|r| !told(r)).map(|r| format!("remark: {r}")));
-        finding.notes.extend(not_shown);
+        let remarks = report.remarks.iter().filter(|remark| !Report::is_cut_short(remark));
+        finding.notes.extend(remarks.map(|r| format!("remark: {r}")));
     }
 
     /// How the GPUs that a report has timings of differ from those of this machine.
