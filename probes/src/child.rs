@@ -1,4 +1,4 @@
-//! Parts of a measurement, and whole measurements, in processes of their own: a crash costs the part, not the run.
+//! Parts of a measurement, and whole measurements, in their own processes: a crash costs the part, not the run.
 
 use crate::interrupt;
 use anyhow::Context;
@@ -8,13 +8,13 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// How long to wait for the next line before looking at the clock and for Ctrl-C.
+/// Interval of looking at the clock and for Ctrl-C.
 const POLL: Duration = Duration::from_millis(50);
 
-/// How long a process that stops with this one may take to write what it has. It ends its own parts at once.
+/// Time for a process that stops with this one to write what it has. It ends its own parts at once.
 const SAVING: Duration = Duration::from_secs(20);
 
-/// How a part ended.
+/// The end of a part.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Ended {
     /// With exit status 0.
@@ -25,10 +25,11 @@ pub(crate) enum Ended {
     Badly(String),
 }
 
-/// Runs `sapwise part ARGUMENTS` and hands on each line that it prints, until it ends, `limit` is over or the user interrupts.
+/// Runs `sapwise part ARGUMENTS` and hands each line that it prints to `on_line`, until it ends, `limit` is over or
+/// the user interrupts.
 ///
 /// # Errors
-/// When the process can't be started, or `on_line` fails; the process is ended then.
+/// When the process can't be started, or `on_line` fails, which ends the process.
 pub(crate) fn run_part(
     arguments: &[&str],
     limit: Duration,
@@ -38,13 +39,13 @@ pub(crate) fn run_part(
     run(command.arg("part").args(arguments), limit, Duration::ZERO, on_line, &mut || {})
 }
 
-/// Runs another `sapwise` with these arguments, which must make it [`stop_with_parent`], and these variables. Calls `on_wait`
-/// over and over until it ends.
+/// Runs another `sapwise` with these arguments, which must make it [`stop_with_parent`], and these environment
+/// variables. Calls `on_wait` over and over until it ends.
 ///
 /// # Errors
 /// When the process can't be started.
 pub(crate) fn run_verb(
-    arguments: &[String],
+    arguments: &[OsString],
     variables: &[(&str, String)],
     limit: Duration,
     on_wait: &mut dyn FnMut(),
@@ -54,7 +55,8 @@ pub(crate) fn run_verb(
     run(&mut command, limit, SAVING, &mut |_| Ok(()), on_wait)
 }
 
-/// This program again. Where the system does not tell where it is, as Linux without `/proc`, it is called as it was called itself.
+/// Returns this program as a command. On a system that does not tell its path, such as Linux without `/proc`, by its
+/// own name.
 fn own_program() -> anyhow::Result<Command> {
     let path = std::env::current_exe().or_else(|error| std::env::args_os().next().map(Into::into).ok_or(error));
     Ok(Command::new(path.context("the program can't find itself")?))
@@ -74,8 +76,8 @@ fn run(
         .spawn()
         .context("a part of the measurement can't be started as a process")?;
     let mut child = EndedOnDrop(child);
-    // Kept open until the end: the part ends when this pipe closes, so it never outlives this process. `wait` would close
-    // it too early, were it still in the child.
+    // Open until the end: the part ends when this pipe closes, so it never outlives this process. Left in the child,
+    // `wait` would close it too early.
     let leash = child.0.stdin.take();
     let complaints = child.0.stderr.take().map(last_line);
     let lines = child.0.stdout.take().map(lines);
@@ -87,7 +89,7 @@ fn run(
             Err(RecvTimeoutError::Timeout) => {}
         }
         if interrupt::requested() {
-            // Lets go of a process that stops with this one, and gives it time to write what it has. Others are ended.
+            // A process that stops with this one gets time to write what it has. Others are killed on drop.
             drop(leash);
             let end = Instant::now() + saving;
             while Instant::now() < end && !matches!(lines.recv_timeout(POLL), Err(RecvTimeoutError::Disconnected)) {}
@@ -111,7 +113,7 @@ pub(crate) fn stop_with_parent() {
     });
 }
 
-/// Ends this process when the pipe of the process that started it closes. For parts, as their first step.
+/// Ends this process when the pipe of the process that started it closes. The first step of a part.
 pub(crate) fn end_with_parent() {
     std::thread::spawn(|| {
         // The parent writes nothing, so this returns at the end only.
@@ -130,7 +132,7 @@ impl Drop for EndedOnDrop {
     }
 }
 
-/// Lines as they come. A line that is not text ends them, since nothing after it can be trusted.
+/// Returns lines as they come. A line that is not text ends them, since nothing after it can be trusted.
 fn lines(source: impl Read + Send + 'static) -> Receiver<String> {
     let (sender, receiver) = channel();
     std::thread::spawn(move || {
@@ -143,7 +145,7 @@ fn lines(source: impl Read + Send + 'static) -> Receiver<String> {
     receiver
 }
 
-/// The last line of what a part complains about. All is read, because a full pipe would stop the part.
+/// Returns the last line of standard error. Reads everything, because a full pipe would stop the part.
 fn last_line(source: impl Read + Send + 'static) -> JoinHandle<String> {
     std::thread::spawn(move || {
         BufReader::new(source).lines().map_while(Result::ok).filter(|l| !l.trim().is_empty()).last().unwrap_or_default()
@@ -156,7 +158,7 @@ fn judge(status: ExitStatus, complaint: &str) -> Ended {
     }
     #[cfg(unix)]
     if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
-        // The terminal sends these to the part as well, and it may be the first to go.
+        // The terminal sends these to the part as well, which may end first.
         return if matches!(signal, 1 | 2 | 15) {
             Ended::Interrupted
         } else {

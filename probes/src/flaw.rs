@@ -1,6 +1,6 @@
 //! What makes a report that is there already worth measuring again.
 
-use crate::{restriction, revisions};
+use crate::revisions;
 use sapwise::Registry;
 use sapwise_lab::report::{Label, Report};
 
@@ -17,9 +17,5 @@ pub(crate) fn flaw(report: &Report, registry: &Registry) -> Option<String> {
     if report.points.is_empty() && !hardware_only || report.is_unfinished() {
         return Some("it is incomplete".to_owned());
     }
-    let asked = provenance.command.split(' ').any(|word| word.starts_with("--contended"));
-    if report.label == Label::RealContended && !asked {
-        return Some("other programs disturbed it".to_owned());
-    }
-    restriction::not_shown(provenance.restriction.as_ref()?).into_iter().next()
+    (report.label == Label::RealContended).then(|| "other programs disturbed it".to_owned())
 }

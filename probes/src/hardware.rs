@@ -1,47 +1,46 @@
-//! The hardware parameters of this machine, each family measured in a process of its own.
+//! The hardware parameters of this machine.
 
-use crate::child::{Ended, run_part};
 use crate::exit::WrongUsage;
 use crate::gpus::{self, GpuChoice};
+use crate::interrupt;
 use crate::progress::Progress;
-use sapwise::measure::{self, Family};
+use sapwise::measure::{self, Family, Options};
 use sapwise::{Hardware, Parameter, usable_cores};
-use std::time::Duration;
 
-/// A family takes a second or less. One that takes this long hangs in a driver or has no processor to run on.
-const LIMIT: Duration = Duration::from_secs(15);
-
-/// Measures every family of parameters, on at most `threads` cores, in under five seconds, then the GPUs that are taken.
+/// Measures the parameters of the CPU on at most `threads` cores, in under five seconds, then the GPUs that are
+/// taken.
 ///
-/// A family that crashes, hangs or is interrupted leaves its parameters missing, with the reason. What is told of the GPUs
-/// beside their parameters, which move into the hardware, is the second part of the answer.
+/// After Ctrl-C the parameters that were not measured are missing, with the reason. The hardware takes the parameters
+/// of the GPUs; whatever else is known of them is the second part of the answer.
 ///
 /// # Errors
-/// When no process can be started, or a GPU that was asked for by its number is not there.
+/// When no process can be started, or this machine lacks a GPU that `--gpu` names.
 pub(crate) fn measure_hardware(threads: Option<u32>, choice: &GpuChoice) -> anyhow::Result<(Hardware, gpus::Measured)> {
-    let mut hardware = measure_cpu(threads)?;
+    let mut hardware = measure_cpu(threads);
     let mut measured = gpus::measure(choice, threads)?;
     hardware.gpus = std::mem::take(&mut measured.gpus);
     hardware.gpu_groups = std::mem::take(&mut measured.groups);
     Ok((hardware, measured))
 }
 
-fn measure_cpu(threads: Option<u32>) -> anyhow::Result<Hardware> {
+fn measure_cpu(threads: Option<u32>) -> Hardware {
     let progress = Progress::new(Family::ALL.into_iter().map(usual_ms).sum());
+    let options = Options::default().with_threads(threads);
     let mut found: Vec<Parameter> = Vec::new();
     for family in Family::ALL {
-        let name = family.as_str();
-        progress.message(format!("hardware: {name}"));
-        match measure_family(name, threads)? {
-            Ok(parameters) => found.extend(parameters),
-            Err(why) => found.extend(family.parameters().iter().map(|p| Parameter::missing(p, &why))),
+        progress.message(format!("hardware: {}", family.as_str()));
+        if interrupt::requested() {
+            let why = "interrupted before it was measured";
+            found.extend(family.parameters().iter().map(|p| Parameter::missing(p, why)));
+        } else {
+            found.extend(measure::family(family, &options));
         }
         progress.advance(usual_ms(family));
     }
-    Ok(measure::assemble(measure::machine(), found))
+    measure::assemble(measure::machine(), found)
 }
 
-/// What a family takes on a machine of two cores, for the time that is left: the latencies of caches take as long as all others together.
+/// The time of a family on a machine of two cores, in milliseconds.
 fn usual_ms(family: Family) -> u64 {
     match family {
         Family::Topology => 10,
@@ -57,7 +56,7 @@ fn usual_ms(family: Family) -> u64 {
 /// Refuses more threads than this process may use.
 ///
 /// # Errors
-/// Says how many there are.
+/// Names the number of cores.
 pub(crate) fn check_threads(threads: Option<u32>) -> Result<(), WrongUsage> {
     let cores = usable_cores();
     match threads {
@@ -66,28 +65,4 @@ pub(crate) fn check_threads(threads: Option<u32>) -> Result<(), WrongUsage> {
         }
         _ => Ok(()),
     }
-}
-
-/// The parameters of a family, or why there are none.
-fn measure_family(name: &str, threads: Option<u32>) -> anyhow::Result<Result<Vec<Parameter>, String>> {
-    if crate::interrupt::requested() {
-        return Ok(Err("interrupted before it was measured".to_owned()));
-    }
-    let threads = threads.map(|k| k.to_string());
-    let mut arguments = vec!["hardware", name];
-    if let Some(threads) = &threads {
-        arguments.extend(["--threads", threads]);
-    }
-    let mut text = String::new();
-    let ended = run_part(&arguments, LIMIT, &mut |line| {
-        text.push_str(line);
-        Ok(())
-    })?;
-    Ok(match ended {
-        Ended::Well => {
-            serde_json::from_str(&text).map_err(|e| format!("the probe {name} returned an unreadable answer: {e}"))
-        }
-        Ended::Interrupted => Err("interrupted while it was measured".to_owned()),
-        Ended::Badly(how) => Err(format!("the probe {name} {how}")),
-    })
 }

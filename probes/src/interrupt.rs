@@ -1,4 +1,5 @@
-//! Ctrl-C, SIGTERM and SIGHUP: the first asks the verb to stop and keep what it has, the second ends the program at once.
+//! Ctrl-C, SIGTERM and SIGHUP: the first signal asks the verb to stop and keep what it has, the second ends the
+//! program.
 
 use anyhow::Context;
 use sapwise_lab::progress::Interrupted;
@@ -7,19 +8,19 @@ use std::sync::atomic::{AtomicBool, AtomicU8, Ordering::SeqCst};
 
 static REQUESTED: AtomicBool = AtomicBool::new(false);
 
-/// The number of the signal that asked; 0 where it was none.
+/// The number of the first signal; 0 before it.
 static SIGNAL: AtomicU8 = AtomicU8::new(0);
 
 /// From now on signals set a flag instead of ending the program. For verbs that poll [`requested`].
 ///
-/// A signal that the program was started to ignore is ignored: `nohup` does so with SIGHUP, shells with the SIGINT of what runs in the
-/// background.
+/// A signal that the parent process had ignored stays ignored: `nohup` ignores SIGHUP, shells the SIGINT of
+/// background jobs.
 ///
 /// # Errors
 /// When the system refuses the handler.
 pub(crate) fn listen() -> anyhow::Result<()> {
     on_signal(|signal| {
-        // The number first: whoever sees the request may end at once.
+        // The number first: a verb that sees the request may end at once.
         let first = SIGNAL.compare_exchange(0, signal, SeqCst, SeqCst).is_ok();
         if REQUESTED.swap(true, SeqCst) && !first {
             // Child processes notice the closed pipe and end too.
@@ -30,7 +31,7 @@ pub(crate) fn listen() -> anyhow::Result<()> {
     .context("Ctrl-C can't be caught")
 }
 
-/// Does what a first Ctrl-C does, however often.
+/// Does what the first Ctrl-C does.
 pub(crate) fn request() {
     REQUESTED.store(true, SeqCst);
 }
@@ -40,7 +41,7 @@ pub(crate) fn requested() -> bool {
     REQUESTED.load(SeqCst)
 }
 
-/// The exit status of a program that has stopped because a signal asked it to, as shells report one that was ended by it.
+/// Returns the exit status after a signal, 128 plus its number as in shells; `None` without a signal.
 pub(crate) fn exit_status() -> Option<u8> {
     let signal = SIGNAL.load(SeqCst);
     (signal > 0).then_some(128 + signal)
@@ -65,7 +66,7 @@ fn on_signal(mut caught: impl FnMut(u8) + Send + 'static) -> io::Result<()> {
     Ok(())
 }
 
-/// Whether whoever started the program wanted a signal to be ignored.
+/// Whether the parent process had ignored a signal.
 #[cfg(unix)]
 fn is_ignored(signal: libc::c_int) -> bool {
     let mut found = std::mem::MaybeUninit::<libc::sigaction>::zeroed();
@@ -76,7 +77,7 @@ fn is_ignored(signal: libc::c_int) -> bool {
     asked == 0 && action.sa_sigaction == libc::SIG_IGN
 }
 
-/// Ends the program as if it had never caught the signal, so that whoever waits for it sees which one it was.
+/// Ends the program as if it had never caught the signal, so that its parent sees which one it was.
 #[cfg(unix)]
 fn end_by(signal: u8) {
     let _ = signal_hook::low_level::emulate_default_handler(signal.into());
@@ -87,7 +88,7 @@ fn on_signal(mut caught: impl FnMut(u8) + Send + 'static) -> io::Result<()> {
     ctrlc::set_handler(move || caught(SIGINT)).map_err(io::Error::other)
 }
 
-/// What shells call Ctrl-C, where the system has no number for it.
+/// The number of Ctrl-C in shells: Windows has none.
 #[cfg(windows)]
 const SIGINT: u8 = 2;
 

@@ -9,21 +9,21 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// Nothing is drawn before this: work that is done by then needs no bar.
+/// Time before the bar appears: shorter work needs none.
 const DELAY: Duration = Duration::from_secs(1);
 
-/// The bar is drawn again this often while no step is done, so that the seconds go on.
+/// Interval of redrawing while no step is done, so that the seconds go on.
 const TICK: Duration = Duration::from_secs(1);
 
-/// What is shown on a terminal of at least so many columns: a line that wraps could not be drawn over. The time left follows from how fast the
-/// steps were done of late.
+/// Templates with the least width of the terminal in columns: a line that wraps could not be redrawn. The time left
+/// follows from the speed of the latest steps.
 const TEMPLATES: [(u16, &str); 3] = [
     (80, "{bar:32} {percent:>3} % {elapsed}{left}  {wide_msg}"),
     (40, "{percent:>3} % {elapsed}{left}  {wide_msg}"),
     (0, "{percent:>3} % {wide_msg}"),
 ];
 
-/// Every terminal and every encoding has these.
+/// Characters that every terminal and every encoding has.
 const BAR: &str = "=> ";
 
 fn template(columns: u16) -> &'static str {
@@ -32,7 +32,7 @@ fn template(columns: u16) -> &'static str {
 
 /// A bar that shows itself after a second, and not at all when standard error is no terminal.
 ///
-/// Where steps take unlike times their number is no share of the work: give each as many as it takes milliseconds or bytes.
+/// When steps take unlike times, count milliseconds or bytes instead.
 pub(crate) struct Progress {
     bar: ProgressBar,
     /// Shows the bar after the delay, unless the sender is gone by then.
@@ -51,22 +51,22 @@ impl Progress {
         Self { bar, showing }
     }
 
-    /// Says what is being done.
+    /// Shows what is being done.
     pub(crate) fn message(&self, text: impl Into<String>) {
         self.bar.set_message(text.into());
     }
 
-    /// Some steps are done.
+    /// Adds steps that are done.
     pub(crate) fn advance(&self, steps: u64) {
         self.bar.inc(steps);
     }
 
-    /// That many steps are done in all.
+    /// Sets the number of steps that are done.
     pub(crate) fn position(&self, steps: u64) {
         self.bar.set_position(steps);
     }
 
-    /// There are that many steps in all, as has turned out.
+    /// Sets the number of all steps.
     pub(crate) fn steps(&self, steps: u64) {
         self.bar.set_length(steps);
     }
@@ -82,7 +82,7 @@ impl Progress {
     }
 }
 
-/// The time left; nothing before the first step, when it can't be told.
+/// Writes the time left; nothing before the first step, when it is unknown.
 fn left(state: &ProgressState, out: &mut dyn Write) {
     let written: fmt::Result =
         if state.pos() == 0 { Ok(()) } else { write!(out, ", {:#} left", HumanDuration(state.eta())) };
@@ -90,8 +90,8 @@ fn left(state: &ProgressState, out: &mut dyn Write) {
     let _ = written;
 }
 
-/// A thread that shows the bar after the delay: the thread that does the work may be waiting for a driver then. Without a thread there is no
-/// bar.
+/// Shows the bar after the delay on another thread, because the working thread may be waiting for a driver. Without a
+/// thread there is no bar.
 fn show_later(bar: ProgressBar) -> Option<(Sender<()>, JoinHandle<()>)> {
     let (alive, ended) = channel();
     let show = move || {

@@ -1,25 +1,20 @@
-//! How a report was made, and what kind of evidence that makes it.
+//! How a report was made, and which label that gives it.
 
 use crate::algorithms::Algorithms;
 use crate::args::Probe;
 use crate::date;
 use crate::gpus::uses;
-use crate::restriction;
 use sapwise::stats::median;
 use sapwise::{Entry, GpuKind, Hardware, SimdLevel, usable_cores};
-use sapwise_lab::report::{Label, Point, Provenance, Restriction, Timed, TimedTerm};
+use sapwise_lab::report::{Label, Point, Provenance, Restricted, Restriction, Timed, TimedTerm};
 use std::time::Duration;
 
-/// A machine whose other programs take more than this share of the CPU at half of the points is not undisturbed.
+/// Share of the CPU that other programs take at half of the points of a contended machine.
 const CONTENDED_LOAD: f64 = 0.2;
 
-/// The provenance of a report that these arguments led to.
-pub(crate) fn provenance(
-    arguments: &Probe,
-    restriction: Option<Restriction>,
-    hardware: &Hardware,
-    took: Duration,
-) -> Provenance {
+/// Returns the provenance of a report by these arguments.
+pub(crate) fn provenance(arguments: &Probe, hardware: &Hardware, took: Duration) -> Provenance {
+    let gpu_threads = gpu_threads(hardware);
     Provenance {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         date: date::today(),
@@ -27,14 +22,32 @@ pub(crate) fn provenance(
         seed: arguments.seed,
         threads: arguments.threads,
         simd: requested_level().map(|level| level.to_string()),
-        gpu_threads: restriction::gpu_threads(hardware),
-        restriction,
+        gpu_threads,
+        restriction: restriction(arguments.threads, gpu_threads),
         optimised: !cfg!(debug_assertions),
         seconds: (took.as_secs_f64() * 10.0).round() / 10.0,
     }
 }
 
-/// What kind of evidence these points are.
+/// Returns what these limits and the environment take from the machine, if anything.
+fn restriction(threads: Option<u32>, gpu_threads: Option<u32>) -> Option<Restriction> {
+    let all = usable_cores();
+    let mut kinds = Vec::new();
+    kinds.extend(threads.filter(|&k| k < all).map(|_| Restricted::Threads));
+    kinds.extend((SimdLevel::in_use() < SimdLevel::detected()).then_some(Restricted::Simd));
+    // lavapipe takes one thread for each core by itself.
+    kinds.extend(gpu_threads.filter(|&k| k < all).map(|_| Restricted::GpuThreads));
+    (!kinds.is_empty()).then_some(Restriction { kinds, proof: Vec::new() })
+}
+
+/// Returns `LP_NUM_THREADS`, the threads of lavapipe (which names itself llvmpipe), when that is among these GPUs.
+fn gpu_threads(hardware: &Hardware) -> Option<u32> {
+    let asked = std::env::var("LP_NUM_THREADS").ok()?.trim().parse().ok()?;
+    let is_lavapipe = |name: &str| name.to_ascii_lowercase().contains("llvmpipe");
+    hardware.gpus.iter().any(|g| is_lavapipe(&g.gpu.name)).then_some(asked)
+}
+
+/// Returns the kind of evidence of these points.
 pub(crate) fn label(arguments: &Probe, points: &[Point], hardware: &Hardware) -> Label {
     let software = |k: &u32| hardware.gpu(*k).is_some_and(|g| g.gpu.kind == GpuKind::Software);
     let on_software_gpu = points
@@ -43,8 +56,8 @@ pub(crate) fn label(arguments: &Probe, points: &[Point], hardware: &Hardware) ->
         .any(|t| !t.samples_ns.is_empty() && uses(&t.algorithm).iter().any(software));
     let fewer_cores = arguments.threads.is_some_and(|k| k < usable_cores());
     let lower_level = requested_level().is_some_and(|level| level < SimdLevel::detected());
-    // Contention first: a restricted machine that is disturbed shows what no restriction explains.
-    if arguments.contended.is_some() || median_foreign_load(points).is_some_and(|load| load > CONTENDED_LOAD) {
+    // First: a restricted machine that is disturbed shows what no restriction explains.
+    if median_foreign_load(points).is_some_and(|load| load > CONTENDED_LOAD) {
         Label::RealContended
     } else if on_software_gpu {
         Label::RealSoftwareGpu
@@ -55,7 +68,7 @@ pub(crate) fn label(arguments: &Probe, points: &[Point], hardware: &Hardware) ->
     }
 }
 
-/// The algorithms that have timings at these points, in the order of the registry, then those of the GPUs.
+/// Returns the algorithms with timings at these points in the order of the registry, then those of the GPUs.
 pub(crate) fn timed(
     points: &[Point],
     threads: Option<u32>,
@@ -73,18 +86,18 @@ pub(crate) fn timed(
     entries.filter(|e| raced(e.id.clone())).map(timed).collect()
 }
 
-/// `None` for a wrong variable too: the program has refused it before.
+/// Returns the SIMD level that the environment forces. The program has refused a wrong one before.
 fn requested_level() -> Option<SimdLevel> {
     SimdLevel::requested().ok().flatten()
 }
 
-/// Over the points where it could be told.
+/// Returns the median over the points at which it is known.
 fn median_foreign_load(points: &[Point]) -> Option<f64> {
     let loads: Vec<f64> = points.iter().filter_map(|p| p.foreign_load).collect();
     median(&loads)
 }
 
-/// The arguments without `--out`: paths name users.
+/// Returns the arguments without `--out`, because paths name users.
 pub(crate) fn command(arguments: &Probe) -> String {
     let mut words = vec!["probe".to_owned()];
     let flags = [
@@ -95,7 +108,6 @@ pub(crate) fn command(arguments: &Probe) -> String {
     ];
     words.extend(flags.iter().filter(|f| f.1).map(|f| f.0.to_owned()));
     words.extend(arguments.gpus.only.iter().map(|k| format!("--gpu {k}")));
-    words.extend(arguments.contended.map(|kind| format!("--contended={kind}")));
     words.extend(arguments.threads.map(|k| format!("--threads {k}")));
     words.push(format!("--seed {}", arguments.seed));
     words.extend(arguments.max_objects.map(|n| format!("--max-objects {n}")));
@@ -138,11 +150,6 @@ mod tests {
             probe(&["--quick", "--out", "/home/someone/r.json", "--threads", "1", "--scenario", "slab", "--no-gpus"]);
         assert_eq!(command(&arguments), "probe --quick --no-gpus --threads 1 --seed 1 --scenario slab");
         assert_eq!(command(&probe(&["--gpu", "0", "--gpu", "2"])), "probe --gpu 0 --gpu 2 --seed 1");
-        assert_eq!(command(&probe(&["--contended"])), "probe --contended=memory --seed 1");
-        assert_eq!(
-            command(&probe(&["--contended=cache", "--threads", "1"])),
-            "probe --contended=cache --threads 1 --seed 1"
-        );
     }
 
     #[test]
@@ -150,8 +157,6 @@ mod tests {
         let quiet = [point(Some(0.01)), point(None), point(Some(0.9)), point(Some(0.0))];
         let busy = [point(Some(0.3)), point(Some(0.4)), point(Some(0.0))];
         let label = |words: &[&str], points: &[Point]| label(&probe(words), points, &hardware(GpuKind::Discrete));
-        assert_eq!(label(&["--contended"], &quiet), Label::RealContended);
-        assert_eq!(label(&["--contended=cache"], &quiet), Label::RealContended);
         assert_eq!(label(&[], &busy), Label::RealContended);
         if requested_level().is_none() {
             assert_eq!(label(&[], &quiet), Label::RealFull);

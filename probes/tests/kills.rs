@@ -1,8 +1,9 @@
-//! Verbs that are killed at any moment, or run out of disk: every older file is whole, every newer one is complete, and
-//! the same command works again.
+//! Verbs that are killed at any moment, or run out of disk: older files stay whole, newer ones are complete, and the
+//! same command works again.
 //!
 //! `SAPWISE_KILLS=N` kills each verb N times, and `SAPWISE_SMALL_DISK=FOLDER` fills that disk: `tools/kills.sh` does
-//! both. Without it files end where the system's limit on their size does.
+//! both. Without a small disk the tests limit the size of files.
+#![cfg(feature = "long-tests")]
 
 mod common;
 
@@ -15,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-/// How often each verb is killed where nothing is said.
+/// How often each verb is killed without `SAPWISE_KILLS`.
 const KILLS: u64 = 4;
 
 /// Numbers from 0 to 1 that follow from the first.

@@ -1,12 +1,12 @@
-//! `sapwise probe`: reports that read back, interruptions and disks that fail.
+//! `sapwise probe`: reports that read back, interrupts and disks that fail.
 
 mod common;
 
-#[cfg(unix)]
+#[cfg(all(unix, feature = "long-tests"))]
 use common::{TERMINATED, send};
 use common::{failure, sapwise, success};
 use sapwise::ParameterId;
-use sapwise_lab::report::{Label, Report};
+use sapwise_lab::report::Report;
 use std::fs;
 use std::path::Path;
 
@@ -42,20 +42,16 @@ fn a_probe_writes_a_report_that_reads_back_with_every_parameter_and_point() {
     success(sapwise().arg("check").arg(&out));
 }
 
+#[cfg(feature = "long-tests")]
 #[test]
-fn fewer_threads_and_contention_are_labelled_and_json_alone_writes_no_file() {
+fn json_alone_writes_no_file_and_the_default_is_report_json() {
     let folder = tempfile::tempdir().unwrap();
     let mut command = sapwise();
-    command.current_dir(folder.path()).args(TINY).args(["--threads", "1", "--contended", "--json"]);
+    command.current_dir(folder.path()).args(TINY).args(["--threads", "1", "--json"]);
     let report = sapwise_lab::report::read(&success(&mut command)).unwrap().value;
-    assert_eq!((report.label, report.provenance.threads), (Label::RealContended, Some(1)));
+    assert_eq!(report.provenance.threads, Some(1));
     assert!(report.algorithms.iter().all(|t| t.id.threads() == 1), "{:?}", report.algorithms);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
-}
-
-#[test]
-fn hardware_only_has_no_points_and_goes_to_report_json() {
-    let folder = tempfile::tempdir().unwrap();
     success(sapwise().current_dir(folder.path()).args(["probe", "--hardware-only"]));
     let report = read(&folder.path().join("report.json"));
     assert!(report.points.is_empty() && report.algorithms.is_empty());
@@ -70,7 +66,7 @@ fn a_folder_that_takes_no_file_is_told_before_measuring() {
     assert!(complaint.contains("--out"), "{complaint}");
 }
 
-#[cfg(target_os = "linux")]
+#[cfg(all(target_os = "linux", feature = "long-tests"))]
 #[test]
 fn a_full_disk_keeps_the_report_in_the_folder_for_temporary_files() {
     let folder = tempfile::tempdir().unwrap();
@@ -83,7 +79,7 @@ fn a_full_disk_keeps_the_report_in_the_folder_for_temporary_files() {
 }
 
 /// A probe of all scenarios that has written what it has for the first time, and goes on.
-#[cfg(unix)]
+#[cfg(all(unix, feature = "long-tests"))]
 fn under_way(out: &Path) -> std::process::Child {
     let mut probe = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
     probe.env_remove("SAPWISE_SIMD").args(["probe", "--max-objects", "30"]).arg("--out").arg(out);
@@ -98,41 +94,36 @@ fn under_way(out: &Path) -> std::process::Child {
     probe
 }
 
-#[cfg(unix)]
+#[cfg(all(unix, feature = "long-tests"))]
 #[test]
-fn an_interrupt_keeps_what_was_measured() {
+fn an_interrupt_keeps_what_was_measured_and_leaves_a_report_that_is_there() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("report.json");
-    let probe = under_way(&out);
-    send("-TERM", &probe);
-    let ended = probe.wait_with_output().unwrap();
-    let complaint = String::from_utf8_lossy(&ended.stderr).into_owned();
-    assert_eq!(ended.status.code(), Some(TERMINATED), "{complaint}");
-    assert!(complaint.contains("error: interrupted"), "{complaint}");
-    let report = read(&out);
-    assert!(!report.points.is_empty());
-    assert!(report.remarks.iter().any(|r| r.starts_with("interrupted after ")), "{:?}", report.remarks);
-    assert!(!report.remarks.iter().any(|r| r.starts_with("unfinished")), "{:?}", report.remarks);
-    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "a temporary file is left");
-}
-
-#[cfg(unix)]
-#[test]
-fn an_interrupt_leaves_a_report_that_is_there_and_keeps_what_was_measured_beside_it() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("report.json");
-    fs::write(&out, "hours of measuring").unwrap();
-    let probe = under_way(&out);
-    send("-TERM", &probe);
-    let complaint = String::from_utf8_lossy(&probe.wait_with_output().unwrap().stderr).into_owned();
     let beside = folder.path().join("report.json.unfinished");
-    assert!(complaint.contains(&format!("error: interrupted: {} holds", beside.display())), "{complaint}");
-    assert_eq!(fs::read_to_string(&out).unwrap(), "hours of measuring");
-    assert!(read(&beside).remarks.iter().any(|r| r.starts_with("interrupted after ")));
+    for (before, kept) in [(None, &out), (Some("hours of measuring"), &beside)] {
+        if let Some(text) = before {
+            fs::write(&out, text).unwrap();
+        }
+        let probe = under_way(&out);
+        send("-TERM", &probe);
+        let ended = probe.wait_with_output().unwrap();
+        let complaint = String::from_utf8_lossy(&ended.stderr).into_owned();
+        assert_eq!(ended.status.code(), Some(TERMINATED), "{complaint}");
+        assert!(complaint.contains(&format!("error: interrupted: {} holds", kept.display())), "{complaint}");
+        let report = read(kept);
+        assert!(!report.points.is_empty());
+        assert!(report.remarks.iter().any(|r| r.starts_with("interrupted after ")), "{:?}", report.remarks);
+        assert!(!report.remarks.iter().any(|r| r.starts_with("unfinished")), "{:?}", report.remarks);
+        if let Some(text) = before {
+            assert_eq!(fs::read_to_string(&out).unwrap(), text);
+        }
+        let files = fs::read_dir(folder.path()).unwrap().count();
+        assert_eq!(files, 1 + usize::from(before.is_some()), "a temporary file is left");
+    }
 }
 
 /// As `nohup` starts it.
-#[cfg(unix)]
+#[cfg(all(unix, feature = "long-tests"))]
 #[test]
 fn a_signal_that_it_was_started_to_ignore_is_ignored() {
     let folder = tempfile::tempdir().unwrap();

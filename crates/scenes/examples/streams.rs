@@ -1,4 +1,5 @@
-//! Writes streams of boxes whose load changes from one frame to the next, as in games: `level.npy`, `fight.npy` and `pooled.npy`.
+//! Writes streams of boxes whose load changes from one frame to the next, as in games: `level.npy`, `fight.npy` and
+//! `pooled.npy`.
 //!
 //! ```sh
 //! cargo run --release -p sapwise-scenes --example streams -- DIR

@@ -1,7 +1,7 @@
-//! Boxes and pairs as numpy reads and writes them: `.npy` files.
+//! Boxes and pairs in `.npy` files, the format of numpy.
 //!
-//! A stream of frames with a varying number of boxes is stored as `frames x n x 6` float32 with the most boxes of any frame as `n`.
-//! Rows at the end of a frame that are NaN throughout are absent boxes.
+//! A stream of frames with a varying number of boxes is stored as `frames x n x 6` float32 with the most boxes of any
+//! frame as `n`. Rows at the end of a frame that are NaN throughout are absent boxes.
 
 mod error;
 mod header;
@@ -19,32 +19,32 @@ const BOUNDS: u64 = 6;
 /// The boxes of each frame of a recorded stream.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frames {
-    /// Of all frames, one after the other.
+    /// The boxes of all frames, one frame after the other.
     boxes: Vec<Aabb>,
-    /// Where each frame ends.
+    /// The end of each frame in `boxes`.
     ends: Vec<usize>,
 }
 
 impl Frames {
-    /// How many frames there are.
+    /// Returns the number of frames.
     #[must_use]
     pub fn len(&self) -> usize {
         self.ends.len()
     }
 
-    /// Whether there is no frame at all. A frame without a box is one.
+    /// Whether there is no frame. A frame without boxes counts as one.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.ends.is_empty()
     }
 
-    /// The most boxes that a frame has.
+    /// Returns the largest number of boxes in a frame.
     #[must_use]
     pub fn objects(&self) -> usize {
         self.iter().map(<[Aabb]>::len).max().unwrap_or(0)
     }
 
-    /// The boxes of a frame; none beyond the last.
+    /// Returns the boxes of a frame; none beyond the last frame.
     #[must_use]
     pub fn frame(&self, frame: usize) -> &[Aabb] {
         let Some(&end) = self.ends.get(frame) else { return &[] };
@@ -52,12 +52,12 @@ impl Frames {
         &self.boxes[start..end]
     }
 
-    /// The boxes of each frame in turn.
+    /// Iterates over the boxes of each frame.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = &[Aabb]> {
         (0..self.len()).map(|frame| self.frame(frame))
     }
 
-    /// Refuses what every algorithm refuses, before the first of them runs.
+    /// Refuses boxes that every algorithm refuses.
     ///
     /// # Errors
     /// Names the first frame and the first box in it that no algorithm can order.

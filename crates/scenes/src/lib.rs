@@ -1,6 +1,7 @@
-//! Scenes of moving boxes for tests, benchmarks and measurements of broad phases, the same bits on every platform.
+//! Scenes of moving boxes to test and measure broad phases with: the same bits on every platform.
 //!
-//! A [`Scenario`] is a kind of scene; with a number of objects and a seed it starts a [`Scene`], which evolves frame by frame:
+//! A [`Scenario`] is a kind of scene; with a number of objects and a seed it starts a [`Scene`], which evolves frame
+//! by frame:
 //!
 //! ```
 //! use sapwise_scenes::Scenario;
@@ -10,12 +11,12 @@
 //! assert_eq!((scene.boxes().len(), scene.frame()), (1000, 1));
 //! ```
 //!
-//! | scenario | what it shows | pairs per object |
+//! | scenario | content | pairs per object |
 //! |---|---|---|
 //! | `uniform` | unit cubes spread evenly, moving a little | 0.4 to 0.55 |
-//! | `fast` | the same, so fast that no frame helps with the next | 0.4 to 0.55 |
+//! | `fast` | `uniform`, so fast that no frame helps with the next | 0.4 to 0.55 |
 //! | `clustered` | dense Gaussian blobs of about a thousand cubes | 2.9 to 4.2 |
-//! | `slab` | a flat world, as the ground of a game is | 0.4 to 0.55 |
+//! | `slab` | a flat world, like the ground of a game | 0.4 to 0.55 |
 //! | `mixed` | edges from 0.1 to 10, and up to four cubes as large as the world | 0.8 to 1.3, and 1 for each of those |
 //! | `resting` | `uniform` with one object in twenty awake | 0.4 to 0.55 |
 //! | `brownian` | cubes that fly straight on and now and then turn | 0.38 to 0.55 |
@@ -27,18 +28,17 @@
 //! | `layers` | thin floors that do not touch | none |
 //! | `plates` | packs of plates as wide as the world, between storeys of cubes | 0.07 to 0.13 |
 //! | `rods` | long thin boxes among cubes | 0.06 to 0.12 |
-//! | `static-world` | a ground of overlapping boxes that never move, and a few objects that do | 10 to 11, 0.01 to 0.12 of them with one that moves |
+//! | `static-world` | overlapping boxes that never move, and a few that do | 10 to 11, 0.01 to 0.12 of them moving |
 //! | `asleep` | one object in fifty far below the floor | 0.06 to 0.13 |
 //! | `tower` | everything on one line | 1 |
 //! | `aliased` | far objects wherever an evenly spaced sample looks | 0.06 to 0.13 |
 //! | `teleport` | every 30th frame everything jumps | 0.06 to 0.13 |
 //!
-//! `fragmentation` follows Figure 1 of Avril, Gouranton and Arnaldi (ISVRI 2011); `brownian`, `free-fall` and `gravity` follow the scenes of
-//! those names of the benchmark Broadmark. The variants of [`Scenario`] describe each in full.
+//! `fragmentation` follows Figure 1 of Avril, Gouranton and Arnaldi (ISVRI 2011); `brownian`, `free-fall` and
+//! `gravity` follow the scenes of those names in the benchmark Broadmark. [`Scenario`] describes each in full.
 //!
-//! Boxes that a simulation recorded are read and written as `.npy` files of numpy: [`Frames`] and [`FrameWriter`].
-//!
-//! Every other random number of Sapwise's measurements, simulations and statistics comes from [`Random`], so that a seed repeats them.
+//! [`Frames`] and [`FrameWriter`] read and write recorded boxes as `.npy` files of numpy. [`Random`] is the generator
+//! of every other random number of Sapwise's measurements and statistics, so that a seed repeats them.
 
 mod frames;
 mod random;

@@ -1,30 +1,31 @@
 //! Random numbers from a seed.
 
-/// A generator of random numbers, splitmix64 of Steele, Lea and Flood (2014): the same numbers for a seed on every platform.
+/// A random number generator: splitmix64 of Steele, Lea and Flood (2014). A seed gives the same numbers on every
+/// platform.
 ///
-/// For orders, draws and simulated noise; not for cryptography.
+/// For orders and draws; not for cryptography.
 #[derive(Debug, Clone)]
 pub struct Random(u64);
 
 impl Random {
-    /// The numbers that belong to a seed.
+    /// Returns the generator of a seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
 
-    /// The numbers that belong to some words and a seed: the same wherever and in whatever order they are asked for.
+    /// Returns the generator of a seed and some words.
     #[must_use]
     pub fn named(seed: u64, words: &[&str]) -> Self {
         let mut state = Self::new(seed);
-        // The end of a word counts too, so that "ab", "c" is not "a", "bc".
+        // 256 ends a word, so that "ab", "c" differs from "a", "bc".
         for byte in words.iter().flat_map(|w| w.bytes().map(u64::from).chain([256])) {
             state = Self::new(state.bits() ^ byte);
         }
         state
     }
 
-    /// 64 random bits.
+    /// Returns 64 random bits.
     pub fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut x = self.0;
@@ -33,7 +34,7 @@ impl Random {
         x ^ (x >> 31)
     }
 
-    /// `0..count` in a random order (Fisher and Yates). For 0 or 1 nothing is drawn.
+    /// Returns `0..count` in random order (Fisher and Yates). Draws nothing for 0 and 1.
     pub fn shuffled(&mut self, count: usize) -> Vec<usize> {
         let mut order: Vec<usize> = (0..count).collect();
         for k in (1..count).rev() {
@@ -42,17 +43,17 @@ impl Random {
         order
     }
 
-    /// Uniform from 0 up to, not including, 1.
+    /// Returns a number uniform over 0 (included) to 1 (excluded).
     pub fn uniform(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Normal, from twelve uniform numbers: mean 0, standard deviation 1, nothing beyond 6.
+    /// Returns a nearly normal number, the sum of twelve uniform ones less six: mean 0, standard deviation 1.
     pub fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
 
-    /// Log-normal: median 1, and standard deviation `sigma` of the natural logarithm.
+    /// Returns a log-normal number: median 1, and standard deviation `sigma` of the natural logarithm.
     pub fn log_normal(&mut self, sigma: f64) -> f64 {
         (sigma * self.normal()).exp()
     }

@@ -31,7 +31,6 @@ fn assert_sound(scene: &Scene, what: &str) {
 fn names_are_read_back_and_others_refused_with_a_list() {
     for scenario in Scenario::ALL {
         assert_eq!(scenario.to_string().parse(), Ok(scenario));
-        assert!(!scenario.description().is_empty() && !scenario.description().contains('\n'));
     }
     let error = "Uniform".parse::<Scenario>().unwrap_err().to_string();
     assert!(
@@ -42,7 +41,8 @@ fn names_are_read_back_and_others_refused_with_a_list() {
 
 #[test]
 fn every_platform_computes_the_same_bits() {
-    // Frame 0, then 20, then 300: by then `free-fall` has been dropped again and `fragmentation` has split and merged.
+    // Frame 0, then 20, then 300: by then `free-fall` has been dropped again and `fragmentation` has split and
+    // merged.
     let golden = [
         (Scenario::Uniform, [0xC779_6697_5446_E185, 0xE9F9_7817_8B43_B575, 0xC8EE_F5A5_1B64_7DBC]),
         (Scenario::Fast, [0xC779_6697_5446_E185, 0x2EE5_C8B9_40C6_7C3B, 0x7FAF_E7EF_1200_A5FD]),

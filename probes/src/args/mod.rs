@@ -15,7 +15,7 @@ use sapwise_scenes::Scenario;
 use std::path::PathBuf;
 
 pub(crate) use part::{Part, PartKind};
-pub(crate) use probe::{Lifted, Probe};
+pub(crate) use probe::Probe;
 pub(crate) use run::{Run, Scene};
 pub(crate) use study::Study;
 

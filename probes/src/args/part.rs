@@ -11,7 +11,7 @@ pub(crate) struct Part {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum PartKind {
-    /// Prints the parameters of one family as JSON.
+    /// Prints the parameters of one family as JSON, for `tools/compare-hardware.sh`.
     Hardware {
         family: String,
         #[arg(long)]

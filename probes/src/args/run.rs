@@ -2,78 +2,69 @@
 
 use super::known;
 use crate::gpus::GpuChoice;
-use crate::replay::CoRunner;
 use clap::Args;
 use sapwise_scenes::Scenario;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// Runs a scenario, or a recorded stream of boxes, with the adaptive choice and with every fixed algorithm, and compares their times.
+/// Runs a scenario, or a recorded stream of boxes, with the adaptive choice and with every fixed algorithm.
 ///
-/// All of them run on the same frames in turn, so that a machine that slows down slows all of them, and start every repeat without what
-/// they kept. Between two turns other work is done, as a program does between two frames. Times are medians over the repeats. They are compared with an oracle that runs the best algorithm of every frame, chosen on
-/// one half of the repeats and timed on the other: the minimum of many noisy times would be less than any algorithm takes.
+/// At each frame all of them take turns in random order, with other work between two turns. Every repeat starts with
+/// fresh algorithms; times are medians over the repeats. The adaptive choice is compared with the best single
+/// algorithm and with an oracle that runs the best algorithm of every 32 frames.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   sapwise run fragmentation
   sapwise run fragmentation --tuning report.json --plot run.svg    # a tuning that was measured on this machine
   sapwise run fragmentation --tuning elsewhere.json --after 300    # the tuning of another machine, corrected by learning
-  sapwise run clustered --swing 50 --frames 600                    # the number of objects grows and shrinks
-  sapwise run uniform --frames 900 --co-runner 450 --trace run.csv
+  sapwise run clustered --swing 50 --frames 600 --trace run.csv    # the number of objects grows and shrinks
   sapwise run clustered --objects 50000 --frames 100 --record clustered.npy --json
-  sapwise run clustered.npy --no-learning              # the pure prediction, on a recorded stream")]
+  sapwise run clustered.npy --no-learning                          # the prediction alone, on a recorded stream")]
 pub(crate) struct Run {
-    /// The scenario; or a stream of your own frames: an .npy file of 32-bit floats of shape frames x n x 6, each row a box: min x y z, max x
-    /// y z. Rows of NaN at the end of a frame are absent boxes.
+    /// The scenario; or a stream: an .npy file of 32-bit floats of shape frames x n x 6, each row a box: min x y z,
+    /// max x y z. Rows of NaN at the end of a frame are absent boxes.
     #[arg(value_name = "SCENARIO|BOXES.npy", value_parser = known::scenario_or(|text: &str| text.parse::<Scene>()))]
     pub(crate) scene: Scene,
-    /// A tuning file, or a report to compute a tuning from. The tuning of another machine shows how learning corrects it. Without this option
-    /// the tuning is predicted from this machine's hardware.
+    /// A tuning file, or a report to compute a tuning from [default: predict from this machine's hardware].
     #[arg(long, value_name = "T.json")]
     pub(crate) tuning: Option<PathBuf>,
     /// Do not correct the expected costs by the times of the frames.
     #[arg(long)]
     pub(crate) no_learning: bool,
-    /// Never run another algorithm than the cheapest to learn what it costs.
-    #[arg(long)]
-    pub(crate) no_exploring: bool,
-    /// Objects; in fragmentation the largest number of them. Without this option 20 000. A stream has its own.
+    /// Number of objects; in fragmentation the largest [default: 20000]. A stream has its own.
     #[arg(long, value_name = "N", value_parser = known::whole(1..=10_000_000), allow_negative_numbers = true)]
     pub(crate) objects: Option<u32>,
-    /// Let the number of objects grow from this one up to --objects and back over the frames.
+    /// Let the number of objects grow from this one to --objects and shrink back over the frames.
     #[arg(long, value_name = "LEAST", value_parser = known::whole(1..=10_000_000), allow_negative_numbers = true)]
     pub(crate) swing: Option<u32>,
-    /// Frames. Without this option 200, in fragmentation one cycle of 600, of a stream all.
+    /// Number of frames [default: 200; in fragmentation one cycle of 600; all of a stream].
     #[arg(long, value_name = "F", value_parser = known::whole(1..=1_000_000), allow_negative_numbers = true)]
     pub(crate) frames: Option<u32>,
-    /// How often the whole simulation is run. With one, the oracle has the least time of every frame.
-    #[arg(long, value_name = "R", default_value_t = 6, value_parser = known::whole(1..=1000), allow_negative_numbers = true)]
+    /// How often all frames are run. With one repeat, noise favours the oracle.
+    #[arg(
+        long, value_name = "R", default_value_t = 6, value_parser = known::whole(1..=1000), allow_negative_numbers = true
+    )]
     pub(crate) repeats: u32,
-    /// Seed of the scene and of the order in which algorithms run.
+    /// Seed of the scene and of the order of turns.
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
-    /// Show the figures before this frame and from it on apart; several with commas between. Without this option 300, the frames that
-    /// learning may take, and the frame of the co-runner.
+    /// Show the frames before this one and from it on apart; several with commas between.
     #[arg(long, value_name = "FRAME", value_delimiter = ',')]
     pub(crate) after: Vec<usize>,
-    /// From this frame on run threads, one for each core or THREADS, that take three eighths of the CPU, so that everything takes about 1.6
-    /// times as long. The slowdown that was reached is printed.
-    #[arg(long, value_name = "FRAME[:THREADS]")]
-    pub(crate) co_runner: Option<CoRunner>,
     #[command(flatten)]
     pub(crate) gpus: GpuChoice,
-    /// Write the frames as a stream before they are run. `run` and `pairs` read it.
+    /// Write the frames as a stream before they are run, for `run` and `pairs`.
     #[arg(long, value_name = "S.npy")]
     pub(crate) record: Option<PathBuf>,
-    /// Where a table goes with one row per frame: load, decision, expected and measured times, the time of every algorithm. A file that ends
-    /// in .csv.
+    /// Write a table with one row a frame: load, choice, expected and measured times, and the time of every
+    /// algorithm.
     #[arg(long, value_name = "T.csv")]
     pub(crate) trace: Option<PathBuf>,
-    /// Where an SVG goes: the time of each frame by the adaptive choice and by every algorithm, and which one was chosen.
+    /// Draw the time of each frame by the choice and by every algorithm, and what was chosen, as SVG.
     #[arg(long, value_name = "P.svg")]
     pub(crate) plot: Option<PathBuf>,
-    /// One JSON object on standard output instead of a table.
+    /// Print one JSON object instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
 }

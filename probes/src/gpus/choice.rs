@@ -1,4 +1,4 @@
-//! Which GPUs a verb takes.
+//! The options of verbs that take GPUs.
 
 use super::look::Seen;
 use crate::exit::WrongUsage;
@@ -8,13 +8,15 @@ use sapwise_lab::report::Report;
 /// The options of verbs that take GPUs.
 #[derive(Debug, Clone, Default, PartialEq, Eq, clap::Args)]
 pub(crate) struct GpuChoice {
-    /// Use no GPU, and load no driver.
+    /// Use no GPU and load no driver.
     #[arg(long, conflicts_with = "software_gpus")]
     pub(crate) no_gpus: bool,
-    /// Use software adapters too, such as llvmpipe and SwiftShader. They run on the CPU and are slower than its own algorithms.
+    /// Use software adapters too, such as llvmpipe and SwiftShader. They run on the CPU and are slower than its own
+    /// algorithms.
     #[arg(long)]
     pub(crate) software_gpus: bool,
-    /// Use this GPU only, as `sapwise devices` numbers it, even if it is a software adapter; may be given several times.
+    /// Use this GPU only, as `sapwise devices` numbers it, even if it is a software adapter; may be given several
+    /// times.
     #[arg(long = "gpu", value_name = "N", conflicts_with_all = ["no_gpus", "software_gpus"])]
     pub(crate) only: Vec<u32>,
 }
@@ -29,10 +31,10 @@ impl GpuChoice {
         }
     }
 
-    /// Refuses GPUs that are asked for by number and not there.
+    /// Refuses numbers of GPUs that this machine lacks.
     ///
     /// # Errors
-    /// Says which are there.
+    /// Names the GPUs that it has.
     pub(crate) fn check(&self, seen: &Seen) -> Result<(), WrongUsage> {
         match seen.lacks(&self.only) {
             Some(why) => Err(WrongUsage(format!("--gpu: {why}"))),
@@ -40,7 +42,7 @@ impl GpuChoice {
         }
     }
 
-    /// Removes GPUs that are not wanted from the timings of a report; its hardware stays as it is.
+    /// Removes other GPUs from the timings of a report; its hardware stays.
     pub(crate) fn restrict(&self, report: &mut Report) {
         let wanted: Vec<u32> =
             report.hardware.gpus.iter().filter(|g| self.takes(&g.gpu)).map(|g| g.gpu.index).collect();
@@ -49,7 +51,7 @@ impl GpuChoice {
         report.points.iter_mut().for_each(|p| p.timings.retain(|t| stays(&t.algorithm)));
     }
 
-    /// What the user should know about GPUs that were not taken, if anything.
+    /// Returns what the user should know about GPUs that were not taken, if anything.
     pub(crate) fn tell(&self, left_out: &[GpuIdentity]) -> Option<String> {
         if self.no_gpus || !self.only.is_empty() || left_out.is_empty() {
             return None;
@@ -64,7 +66,7 @@ impl GpuChoice {
     }
 }
 
-/// The numbers of the GPUs that an algorithm runs on; none on the CPU.
+/// Returns the numbers of the GPUs that an algorithm runs on; none on the CPU.
 pub(crate) fn uses(id: &AlgorithmId) -> &[u32] {
     match id.backend() {
         Backend::Gpu(list) => list,
@@ -72,7 +74,7 @@ pub(crate) fn uses(id: &AlgorithmId) -> &[u32] {
     }
 }
 
-/// How the GPU of a number differs between two machines, if it does.
+/// Returns how the GPU of a number differs between two machines, if it does.
 pub(crate) fn difference(there: Option<&GpuIdentity>, here: Option<&GpuIdentity>) -> Option<String> {
     match (there, here) {
         (Some(a), Some(b)) if (&a.name, &a.device, &a.api) != (&b.name, &b.device, &b.api) => {

@@ -1,4 +1,4 @@
-//! Which algorithms can be made on the GPUs of this machine, tried without loading a driver into the process that asks.
+//! The algorithms that run on the GPUs of this machine, tried in another process that loads the drivers.
 
 use super::choice::uses;
 use super::parameters::inert;
@@ -8,7 +8,7 @@ use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Pairs, Registry, Unavailable
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
-/// Kernels compile in a fraction of a second; a driver may take much longer on its first start.
+/// Kernels compile in a fraction of a second; the first start of a driver may take much longer.
 const LIMIT: Duration = Duration::from_secs(60);
 
 /// An algorithm on GPUs.
@@ -16,13 +16,13 @@ const LIMIT: Duration = Duration::from_secs(60);
 #[serde(deny_unknown_fields)]
 pub(crate) struct OnGpus {
     pub(crate) id: AlgorithmId,
-    /// Why it can't run here, if it can't.
+    /// The reason why it can't run here, if any.
     pub(crate) unavailable: Option<String>,
-    /// The GPU of it that executes nothing, in a sentence, if one does not.
+    /// A sentence about a GPU of it that executes nothing, if one does so.
     pub(crate) inert: Option<String>,
 }
 
-/// What the process prints: each algorithm in a line.
+/// Prints each algorithm in a line.
 ///
 /// # Errors
 /// When standard output can't be written.
@@ -44,12 +44,12 @@ pub(crate) fn print_entries() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// A frame of two boxes: a device that executes nothing compiles whatever it is given.
+/// Runs a frame of two boxes: a device that executes nothing compiles everything.
 fn try_out(algorithm: &mut dyn BroadPhase) -> Result<(), Error> {
     algorithm.find_pairs(&[Aabb::default(); 2], &mut Pairs::new())
 }
 
-/// The algorithms that could be tried, and what kept the process from trying the others.
+/// Returns the algorithms that could be tried, and what kept the process from trying the others.
 ///
 /// # Errors
 /// When no process can be started.

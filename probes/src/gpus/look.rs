@@ -1,23 +1,23 @@
-//! Looking for GPUs.
+//! The search for GPUs.
 
 use crate::child::{Ended, run_part};
 use sapwise::GpuIdentity;
 use sapwise::gpu::Gpus;
 use std::time::Duration;
 
-/// Looking takes tens of milliseconds, and seconds where a driver compiles on its first start.
+/// Looking takes tens of milliseconds, and seconds when a driver compiles on its first start.
 const LIMIT: Duration = Duration::from_secs(30);
 
-/// The GPUs that a process of its own found.
+/// The GPUs that another process found.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Seen {
-    /// By their numbers.
+    /// Ordered by their numbers.
     pub(crate) identities: Vec<GpuIdentity>,
-    /// What went wrong. There are no GPUs then.
+    /// The reason why the search failed. There are no GPUs then.
     pub(crate) remark: Option<String>,
 }
 
-/// Looks for GPUs, without loading a driver into this process.
+/// Looks for GPUs without loading a driver into this process.
 ///
 /// # Errors
 /// When no process can be started.
@@ -32,14 +32,15 @@ pub(crate) fn look() -> anyhow::Result<Seen> {
         Ended::Well => return Ok(Seen { identities, remark: None }),
         Ended::Interrupted => "GPUs are left out: interrupted while looking for them".to_owned(),
         Ended::Badly(how) => format!(
-            "GPUs are left out: the process that looked for them {how}; update or remove the driver, or silence this with --no-gpus"
+            "GPUs are left out: the process that looked for them {how}; update or remove the driver, or use --no-gpus"
         ),
     };
     Ok(Seen { identities: Vec::new(), remark: Some(remark) })
 }
 
 impl Seen {
-    /// Loads the drivers into this process, where there is any GPU. None, with the reason, when what is found now differs.
+    /// Loads the drivers into this process if there is any GPU. An error is a sentence that says how the GPUs have
+    /// changed.
     pub(crate) fn load(&self) -> Result<Gpus, String> {
         if self.identities.is_empty() {
             return Ok(Gpus::none());
@@ -56,7 +57,7 @@ impl Seen {
         Err(format!("GPUs are left out: {before} were seen first and {now} now"))
     }
 
-    /// What keeps an algorithm from running here for want of its GPUs, if anything does.
+    /// Returns which of these GPUs this machine lacks, in a sentence, if any.
     pub(crate) fn lacks(&self, indices: &[u32]) -> Option<String> {
         let absent = indices.iter().find(|k| self.identities.iter().all(|g| g.index != **k))?;
         let there: Vec<String> = self.identities.iter().map(|g| format!("gpu{} ({})", g.index, g.name)).collect();

@@ -1,4 +1,4 @@
-//! The parameters of GPUs, each GPU and each group measured in a process of its own.
+//! The parameters of GPUs: another process measures each GPU and each group.
 
 use super::choice::{GpuChoice, uses};
 use super::look::look;
@@ -12,18 +12,18 @@ use std::time::Duration;
 /// A real GPU takes seconds; a software adapter may be a hundred times slower.
 const LIMIT: Duration = Duration::from_secs(90);
 
-/// What was found out about the GPUs of this machine.
+/// The GPUs of this machine.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Measured {
     /// The GPUs that were taken.
     pub(crate) gpus: Vec<GpuHardware>,
-    /// Those that work together.
+    /// GPUs that work together.
     pub(crate) groups: Vec<GpuGroup>,
-    /// The taken GPUs that may be used from here on: all but those that ended their process and those that execute nothing.
+    /// The taken GPUs that can be used: their process ended well, and they execute kernels.
     pub(crate) usable: Vec<GpuIdentity>,
     /// The GPUs that were not taken.
     pub(crate) left_out: Vec<GpuIdentity>,
-    /// What went wrong.
+    /// Sentences about what went wrong.
     pub(crate) remarks: Vec<String>,
 }
 
@@ -47,7 +47,7 @@ pub(crate) fn measure(choice: &GpuChoice, threads: Option<u32>) -> anyhow::Resul
     measured.remarks.extend(seen.remark);
     let (taken, left_out): (Vec<_>, Vec<_>) = seen.identities.into_iter().partition(|g| choice.takes(g));
     measured.left_out = left_out;
-    // One more for what several do together.
+    // One more for several GPUs together.
     progress.steps(taken.len() as u64 + 1);
     for identity in taken {
         progress.message(format!("hardware: gpu{}", identity.index));
@@ -84,7 +84,7 @@ impl Measured {
         Ok(())
     }
 
-    /// Every set of several GPUs that our algorithms run on.
+    /// Measures every set of several GPUs that our algorithms run on.
     fn measure_groups(&mut self, threads: Option<u32>) -> anyhow::Result<()> {
         let mut sets: Vec<Vec<u32>> = sapwise::gpu::algorithms(&self.usable)
             .iter()
@@ -107,7 +107,7 @@ impl Measured {
     }
 }
 
-/// The answer of a part, or why there is none.
+/// Returns the answer of a part, or why there is none.
 fn part<T: DeserializeOwned>(kind: &str, which: &str, threads: Option<u32>) -> anyhow::Result<Result<T, String>> {
     if crate::interrupt::requested() {
         return Ok(Err("interrupted before it was measured".to_owned()));

@@ -1,7 +1,7 @@
 //! The GPUs of this machine.
 //!
-//! A driver that crashes must cost its GPU and not the run. So a process of its own looks for GPUs first, another one makes the algorithms on
-//! them, and one each measures them; drivers are loaded in the process of a verb only after that went well.
+//! A driver that crashes costs its GPU and not the run: one process looks for GPUs, another one tries the algorithms
+//! on them, and one each measures them. A verb loads drivers into its own process only after that went well.
 
 mod choice;
 mod entries;

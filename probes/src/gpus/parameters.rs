@@ -1,11 +1,11 @@
-//! What the processes that look for GPUs and measure them print.
+//! The output of the processes that look for GPUs and measure them.
 
 use anyhow::anyhow;
 use sapwise::gpu::Gpus;
 use sapwise::measure::Options;
 use sapwise::{GpuGroup, GpuHardware, GpuIdentity, GpuParameterId, Parameter};
 
-/// What the process that looks for GPUs prints: each of them in a line.
+/// Prints each GPU in a line.
 ///
 /// # Errors
 /// When standard output can't be written.
@@ -13,7 +13,7 @@ pub(crate) fn print_identities() -> anyhow::Result<()> {
     Gpus::find().identities().try_for_each(crate::output::print_json)
 }
 
-/// What the process that measures a GPU prints. Parameters that can't be measured are missing, with the reason.
+/// Prints a GPU with its parameters. Those that can't be measured are missing, with the reason.
 ///
 /// # Errors
 /// When there is no such GPU, or standard output can't be written.
@@ -26,7 +26,7 @@ pub(crate) fn print_parameters(index: u32, options: &Options) -> anyhow::Result<
     crate::output::print_json(&hardware)
 }
 
-/// What the process that measures several GPUs together prints.
+/// Prints the parameters of several GPUs together.
 ///
 /// # Errors
 /// When standard output can't be written.
@@ -37,13 +37,13 @@ pub(crate) fn print_group(indices: &[u32], options: &Options) -> anyhow::Result<
     crate::output::print_json(&group)
 }
 
-/// A GPU of which nothing could be measured.
+/// Returns a GPU with every parameter missing.
 pub(super) fn without_parameters(gpu: GpuIdentity, why: &str) -> GpuHardware {
     let names = GpuParameterId::OF_ONE;
     GpuHardware::new(gpu, names.iter().map(|name| Parameter::missing(name, why)).collect())
 }
 
-/// That a GPU executes nothing, in words for whoever may have never heard of that.
+/// Returns a sentence that explains that a GPU executes nothing.
 pub(super) fn inert(gpu: &GpuIdentity) -> String {
     format!(
         "gpu{} ({}) executes nothing: its driver takes work and says that it is done, and no kernel has run",
@@ -51,7 +51,7 @@ pub(super) fn inert(gpu: &GpuIdentity) -> String {
     )
 }
 
-/// Several GPUs that could not be measured together.
+/// Returns several GPUs with every parameter missing.
 pub(super) fn group_without_parameters(indices: &[u32], why: &str) -> GpuGroup {
     let names = GpuParameterId::GROUP;
     GpuGroup::new(indices.to_vec(), names.map(|name| Parameter::missing(name, why)).into())

@@ -1,76 +1,79 @@
-//! `sapwise probe --profiles`: the profiles of one machine, each measured by a process of its own.
+//! `sapwise probe --profiles`: one report for each profile of this machine, each measured by a process of its own.
 
-mod family;
 mod profile;
-mod resume;
-mod runner;
 mod slug;
 
 use crate::algorithms::Algorithms;
 use crate::args::Probe;
+use crate::child::{Ended, run_verb};
 use crate::exit::{Outcome, WrongUsage};
-use crate::restriction::LAVAPIPE_THREADS;
-use crate::{gpus, interrupt, output};
-use anyhow::Context;
-use family::{Whole, family};
+use crate::flaw::flaw;
+use crate::outputs::make_folder;
+use crate::progress::Progress;
+use crate::{gpus, interrupt, output, shell};
+use anyhow::{Context, bail};
 use indicatif::HumanDuration;
-use profile::Profile;
-pub(crate) use profile::machine_stem;
-use resume::Existing;
-use runner::{End, ProfileRunner};
-use sapwise::{GpuIdentity, SimdLevel, measure, usable_cores};
+use profile::{Profile, profiles};
+use sapwise::{GpuIdentity, Registry, SimdLevel, measure, usable_cores};
+use sapwise_lab::data::read_report;
 use sapwise_lab::text::columns;
-use sapwise_scenes::Scenario;
+pub(crate) use slug::machine as machine_stem;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-/// Where the reports go without `--out`.
-const DEFAULT: &str = "reports";
+/// A probe ends by itself long before this. One that does not hangs in a driver.
+const LIMIT: Duration = Duration::from_secs(3600);
 
-/// Measures every profile that the folder does not hold yet.
+/// Measures every profile whose report is missing in the folder or no longer good.
 ///
 /// # Errors
-/// On wrong usage, when the folder takes no file or no process can be started. A profile that fails is told at the end.
+/// On wrong usage, when a file of the folder must not be replaced, when the folder takes no file, or on Ctrl-C.
+/// A profile that fails is printed, and the next one is measured.
 pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
-    // The family sets both; what comes from outside would restrict every profile, also the one that is called full.
-    for name in ["SAPWISE_SIMD", LAVAPIPE_THREADS] {
-        if std::env::var_os(name).is_some_and(|value| !value.is_empty()) {
-            return Err(WrongUsage(format!("--profiles sets {name} itself; unset it and run this again")).into());
-        }
+    if std::env::var_os("SAPWISE_SIMD").is_some_and(|value| !value.is_empty()) {
+        return Err(WrongUsage("--profiles sets SAPWISE_SIMD itself; unset it and run this again".to_owned()).into());
     }
-    let scenarios = arguments.scenarios();
-    let folder = arguments.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT));
-    let machine = measure::machine();
-    let (cores, level) = (usable_cores(), SimdLevel::detected());
-    let family = family(&Whole { cores, level, gpus: taken(arguments)? }, arguments.quick);
-    let stem = machine_stem(&machine.cpu, cores);
-    let registry = algorithms.registry(cores);
-    let (folder, stem, physical_id) = (folder.as_path(), stem.as_str(), machine.physical_id.as_str());
-    let existing = Existing { folder, stem, physical_id, registry: &registry, family: arguments };
-    let done: Vec<Option<PathBuf>> = family.iter().map(|p| existing.find(p)).collect();
+    let cores = usable_cores();
+    let default = || Path::new("reports").join(machine_stem(&measure::machine().cpu, cores));
+    let folder = Folder {
+        path: arguments.out.clone().unwrap_or_else(default),
+        physical_id: measure::machine().physical_id,
+        registry: algorithms.registry(cores),
+    };
+    let all = profiles(arguments, cores, SimdLevel::detected(), &taken(arguments)?);
+    let lacks: Vec<Option<String>> = all.iter().map(|p| folder.lack(p)).collect::<anyhow::Result<_>>()?;
     if arguments.dry_run {
-        output::print(&listing(&family, &done, arguments, &scenarios, stem))?;
+        output::print(&listing(&all, &lacks))?;
         return Ok(Outcome::Done);
     }
-    take_files(folder)?;
+    make_folder(&folder.path)?;
     interrupt::listen()?;
-    let mut runner = ProfileRunner::new(&family, done, &existing, &scenarios);
-    let end = runner.run()?;
-    let failed = runner.failed();
-    output::print(&runner.summary())?;
-    if end == End::Interrupted {
-        anyhow::bail!(
-            "interrupted: the complete profiles are in {}; the same command resumes there, and measures the interrupted profile again",
-            folder.display()
-        );
+    let waiting: Vec<&Profile> = all.iter().zip(&lacks).filter(|(_, lack)| lack.is_some()).map(|(p, _)| p).collect();
+    let progress = Progress::new(waiting.iter().map(|p| p.time.as_secs()).sum());
+    let (mut before, mut failed) = (Duration::ZERO, 0);
+    for (k, profile) in waiting.iter().enumerate() {
+        progress.message(format!("{} of {}: {}", k + 1, waiting.len(), profile.name));
+        if let Some(why) = folder.measure(profile, before, &progress)? {
+            failed += 1;
+            progress.aside(|| output::complain(&format!("{}: FAILED: {why}", profile.name)));
+        }
+        before += profile.time;
     }
-    Ok(if failed { Outcome::Failed } else { Outcome::Done })
+    let shown = shell::path(&folder.path);
+    output::print(&format!("{} of {} profiles are complete in {shown}", all.len() - failed, all.len()))?;
+    if failed > 0 {
+        output::print("Next: run the same command again, which measures those that failed")?;
+        return Ok(Outcome::Failed);
+    }
+    output::print(&format!("Next: sapwise train {shown} --out model.json"))?;
+    Ok(Outcome::Done)
 }
 
 /// The GPUs to make profiles of.
 ///
 /// # Errors
-/// When no process can be started, or a GPU that was asked for by its number is not there.
+/// When no process can be started, or this machine lacks a GPU that `--gpu` names.
 fn taken(arguments: &Probe) -> anyhow::Result<Vec<GpuIdentity>> {
     if arguments.gpus.no_gpus {
         return Ok(Vec::new());
@@ -83,32 +86,122 @@ fn taken(arguments: &Probe) -> anyhow::Result<Vec<GpuIdentity>> {
     Ok(taken)
 }
 
-/// Makes the folder, and tries whether it takes a file, before hours of measuring.
-fn take_files(folder: &Path) -> anyhow::Result<()> {
-    let taken = std::fs::create_dir_all(folder).and_then(|()| tempfile::tempfile_in(folder));
-    taken.with_context(|| format!("no file can be written in {}; name another folder with --out", folder.display()))?;
-    Ok(())
-}
-
-/// The profiles, what each of them is and how long it takes.
-fn listing(
-    family: &[Profile],
-    done: &[Option<PathBuf>],
-    arguments: &Probe,
-    scenarios: &[Scenario],
-    stem: &str,
-) -> String {
+/// Each profile with the longest time that it should take and the command that measures it.
+fn listing(all: &[Profile], lacks: &[Option<String>]) -> String {
     let mut rows = vec![["profile", "at most", "command"].map(str::to_owned).to_vec()];
     let mut left = Duration::ZERO;
-    for (profile, done) in family.iter().zip(done) {
-        let time = profile.time(scenarios, arguments.max_objects);
-        left += if done.is_some() { Duration::ZERO } else { time };
-        let numbers: Vec<u32> = profile.gpus.iter().map(|g| g.index).collect();
-        let variables =
-            profile.variables().into_iter().map(|(name, value)| format!("{name}={value} ")).collect::<String>();
-        let command = format!("{variables}sapwise {}", profile.arguments(arguments, &numbers).join(" "));
-        let time = if done.is_some() { "complete".to_owned() } else { HumanDuration(time).to_string() };
-        rows.push(vec![format!("{stem}-{}", profile.name), time, command]);
+    for (profile, lack) in all.iter().zip(lacks) {
+        left += if lack.is_some() { profile.time } else { Duration::ZERO };
+        let simd = profile.simd.map_or(String::new(), |level| format!("SAPWISE_SIMD={level} "));
+        let time = lack.as_ref().map_or("complete".to_owned(), |_| HumanDuration(profile.time).to_string());
+        rows.push(vec![profile.name.clone(), time, format!("{simd}sapwise {}", profile.command)]);
     }
-    format!("{}\n{} profiles, about {} at most.", columns(&rows), family.len(), HumanDuration(left))
+    format!("{}\n{} profiles, {} at most", columns(&rows), all.len(), HumanDuration(left))
+}
+
+/// Where the reports go, and what they are compared with.
+struct Folder {
+    path: PathBuf,
+    physical_id: String,
+    registry: Registry,
+}
+
+impl Folder {
+    fn report_of(&self, profile: &Profile) -> PathBuf {
+        self.path.join(format!("{}.json", profile.name))
+    }
+
+    /// Why a profile has to be measured; `None` when the folder holds a good report of it.
+    ///
+    /// # Errors
+    /// When its file is no report, or one of another machine or another command: that is never replaced.
+    fn lack(&self, profile: &Profile) -> anyhow::Result<Option<String>> {
+        let path = self.report_of(profile);
+        if !path.exists() {
+            return Ok(Some("it was not measured yet".to_owned()));
+        }
+        let elsewhere = "move it, or name another folder with --out";
+        let (_, report) = read_report(&path, &output::warn).context(elsewhere)?;
+        let (provenance, hardware) = (&report.provenance, &report.hardware);
+        if hardware.machine.physical_id != self.physical_id {
+            bail!("{} is of another machine; {elsewhere}", path.display());
+        }
+        let gpus_differ = !hardware.gpus.iter().map(|g| &g.gpu).eq(&profile.gpus);
+        if provenance.command != profile.command || provenance.simd != profile.simd_text() || gpus_differ {
+            bail!("{} was measured by another command or with other GPUs; {elsewhere}", path.display());
+        }
+        Ok(flaw(&report, &self.registry))
+    }
+
+    /// Measures a profile and returns what is wrong with its report, if anything. `before` is the time of those done.
+    ///
+    /// # Errors
+    /// When no process can be started, and on Ctrl-C.
+    fn measure(&self, profile: &Profile, before: Duration, progress: &Progress) -> anyhow::Result<Option<String>> {
+        let mut arguments: Vec<OsString> = profile.command.split(' ').map(OsString::from).collect();
+        arguments.extend(["--leashed".into(), "--out".into(), self.report_of(profile).into()]);
+        let variables = profile.simd_text().map(|level| ("SAPWISE_SIMD", level));
+        let began = Instant::now();
+        let ended = run_verb(&arguments, variables.as_slice(), LIMIT, &mut || {
+            progress.position((before + began.elapsed().min(profile.time)).as_secs());
+        })?;
+        match ended {
+            // It ends well when Ctrl-C came too late for it.
+            Ended::Well => Ok(self.lack(profile).unwrap_or_else(|error| Some(format!("{error:#}")))),
+            Ended::Badly(how) => Ok(Some(format!("its process {how}"))),
+            Ended::Interrupted => bail!(
+                "interrupted: the complete profiles are in {}; the same command continues with the others",
+                self.path.display()
+            ),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::args::{Arguments, Verb};
+    use clap::Parser;
+    use sapwise_lab::report::{Label, Report};
+
+    fn full(words: &[&str]) -> Profile {
+        let words = ["sapwise", "probe", "--profiles", "--no-gpus"].iter().chain(words);
+        let Verb::Probe(probe) = Arguments::try_parse_from(words).unwrap().verb else { panic!("another verb") };
+        profiles(&probe, 1, SimdLevel::Portable, &[]).swap_remove(0)
+    }
+
+    #[test]
+    fn a_report_with_a_flaw_is_measured_again_and_one_of_another_command_stays() {
+        let text = include_str!("../../../crates/lab/tests/fixtures/report-2-gpu.json");
+        let mut report: Report = sapwise_lab::report::read(text).unwrap().value;
+        // Revisions change with the algorithms.
+        report.algorithms.clear();
+        report.points.iter_mut().for_each(|p| p.timings.clear());
+        report.hardware.gpus.clear();
+        report.hardware.gpu_groups.clear();
+        report.label = Label::RealFull;
+        report.remarks.clear();
+        report.provenance.simd = None;
+        report.provenance.optimised = true;
+        report.provenance.command = full(&[]).command;
+        let folder = tempfile::tempdir().unwrap();
+        let folder = Folder {
+            path: folder.path().to_owned(),
+            physical_id: report.hardware.machine.physical_id.clone(),
+            registry: Registry::with_cores(1),
+        };
+        std::fs::create_dir_all(&folder.path).unwrap();
+        let lack = |words: &[&str], change: &dyn Fn(&mut Report)| {
+            let mut report = report.clone();
+            change(&mut report);
+            std::fs::write(folder.path.join("full.json"), sapwise_lab::report::write(&report).unwrap()).unwrap();
+            folder.lack(&full(words)).map_err(|e| format!("{e:#}"))
+        };
+        assert_eq!(lack(&[], &|_| ()), Ok(None));
+        let disturbed = lack(&[], &|r| r.label = Label::RealContended);
+        assert_eq!(disturbed, Ok(Some("other programs disturbed it".to_owned())));
+        assert!(lack(&[], &|r| r.remarks.push("interrupted".to_owned())).unwrap().is_some());
+        assert!(lack(&["--seed=2"], &|_| ()).unwrap_err().contains("another command"));
+        assert!(lack(&[], &|r| r.hardware.machine.physical_id = "1".repeat(16)).unwrap_err().contains("another machine"));
+    }
 }

@@ -1,124 +1,140 @@
-//! One machine under one restriction.
+//! One machine with fewer threads, a lower SIMD level or other GPUs than it has.
 
+use super::slug;
 use crate::args::Probe;
-use crate::contention::Contended;
-use crate::restriction::{self, LAVAPIPE_THREADS};
-
+use crate::gpus::GpuChoice;
+use crate::provenance;
 use sapwise::{GpuIdentity, GpuKind, SimdLevel};
-use sapwise_lab::report::Restricted;
 use sapwise_lab::sweep::Plan;
-use sapwise_scenes::Scenario;
-use std::path::Path;
 use std::time::Duration;
 
-/// What the hardware parameters of the CPU take, with the start of the processes.
+/// Time for the hardware parameters of the CPU and for starting processes.
 const HARDWARE: Duration = Duration::from_secs(8);
 
-/// What a GPU adds, and a software adapter.
-const REAL_GPU: Duration = Duration::from_secs(8);
-const SOFTWARE_GPU: Duration = Duration::from_secs(25);
+/// Time for the parameters of a GPU. A software adapter is the slowest.
+const GPU: Duration = Duration::from_secs(25);
 
-/// What is taken from the machine, and how long it is measured.
+/// One report of a machine.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Profile {
-    /// Its part of the file name, such as `avx2-1t`.
+    /// Name of its file without the ending, such as `avx2-1t`.
     pub(super) name: String,
-    /// Threads; `None` for all.
-    pub(super) threads: Option<u32>,
-    /// SIMD level; `None` for the highest.
+    /// The command that measures it, without the name of the program, and as the report repeats it.
+    pub(super) command: String,
+    /// SIMD level to force; `None` for the highest.
     pub(super) simd: Option<SimdLevel>,
-    pub(super) contended: Option<Contended>,
-    /// The GPUs that are taken.
     pub(super) gpus: Vec<GpuIdentity>,
-    /// Threads of lavapipe; `None` for what it takes by itself.
-    pub(super) gpu_threads: Option<u32>,
-    pub(super) quick: bool,
+    /// The most that it should take.
+    pub(super) time: Duration,
 }
 
 impl Profile {
-    /// What is taken from the machine.
-    pub(super) fn kinds(&self) -> Vec<Restricted> {
-        let mut kinds = Vec::new();
-        kinds.extend(self.threads.map(|_| Restricted::Threads));
-        kinds.extend(self.simd.map(|_| Restricted::Simd));
-        kinds.extend(self.contended.map(restriction::contention));
-        kinds.extend(self.gpu_threads.map(|_| Restricted::GpuThreads));
-        kinds
-    }
-
-    /// The same with one thing less taken.
-    pub(super) fn lifted(&self, kind: Restricted) -> Self {
-        let mut lifted = self.clone();
-        match kind {
-            Restricted::Threads => lifted.threads = None,
-            Restricted::Simd => lifted.simd = None,
-            Restricted::ContendedMemory | Restricted::ContendedCache => lifted.contended = None,
-            Restricted::GpuThreads => lifted.gpu_threads = None,
-        }
-        lifted
-    }
-
-    /// Whether the same is taken from the machine, whatever its name and length.
-    pub(super) fn is_alike(&self, other: &Self) -> bool {
-        let taken = |p: &Self| (p.threads, p.simd, p.contended, p.gpu_threads);
-        taken(self) == taken(other) && self.gpus == other.gpus
-    }
-
-    /// The command that measures it. `numbers` are those of its GPUs, which may have changed since it was listed.
-    pub(super) fn arguments(&self, family: &Probe, numbers: &[u32]) -> Vec<String> {
-        let mut words = vec!["probe".to_owned(), format!("--seed={}", family.seed)];
-        if self.quick {
-            words.push("--quick".to_owned());
-        }
-        words.extend(self.threads.map(|k| format!("--threads={k}")));
-        words.extend(self.contended.map(|kind| format!("--contended={kind}")));
-        words.extend(numbers.iter().map(|k| format!("--gpu={k}")));
-        if numbers.is_empty() {
-            words.push("--no-gpus".to_owned());
-        }
-        words.extend(family.max_objects.map(|n| format!("--max-objects={n}")));
-        words.extend(family.scenarios.iter().map(|s| format!("--scenario={s}")));
-        words
-    }
-
-    /// The variables that it is measured under.
-    pub(super) fn variables(&self) -> Vec<(&'static str, String)> {
-        let simd = self.simd.map(|level| ("SAPWISE_SIMD", level.to_string()));
-        simd.into_iter().chain(self.gpu_threads.map(|k| (LAVAPIPE_THREADS, k.to_string()))).collect()
-    }
-
-    /// The most that it should take.
-    pub(super) fn time(&self, scenarios: &[Scenario], max_objects: Option<u32>) -> Duration {
-        let plan = Plan::new(self.quick, scenarios, max_objects);
-        let gpu = |g: &GpuIdentity| if g.kind == GpuKind::Software { SOFTWARE_GPU } else { REAL_GPU };
-        plan.total + HARDWARE + self.gpus.iter().map(gpu).sum::<Duration>()
+    pub(super) fn simd_text(&self) -> Option<String> {
+        self.simd.map(|level| level.to_string())
     }
 }
 
-/// The beginning of the file names of a machine's profiles.
-pub(crate) fn machine_stem(cpu: &str, cores: u32) -> String {
-    format!("{}-{cores}c", super::slug::cpu(cpu))
+/// Threads and SIMD level; `None` for all that the machine has.
+type Limits = (Option<u32>, Option<SimdLevel>);
+
+/// The profiles of a machine: the whole of it, each lower SIMD level, fewer threads, and both on one thread; the same
+/// with each real GPU; all real GPUs together; two software adapters together. The first and the one-thread profile
+/// come a second time at the end, for the noise floor.
+///
+/// Profiles with GPUs are quick, and with `--quick` all are.
+pub(super) fn profiles(probe: &Probe, cores: u32, level: SimdLevel, gpus: &[GpuIdentity]) -> Vec<Profile> {
+    let lower: Vec<SimdLevel> = SimdLevel::ALL.into_iter().rev().filter(|&l| l < level).collect();
+    let fewer = std::iter::successors(Some(1_u32), |k| k.checked_mul(2)).take_while(|&k| k < cores);
+    let mut limits: Vec<Limits> = vec![(None, None)];
+    limits.extend(lower.iter().map(|&level| (None, Some(level))));
+    limits.extend(fewer.map(|k| (Some(k), None)));
+    if cores > 1 {
+        limits.extend(lower.iter().map(|&level| (Some(1), Some(level))));
+    }
+    let of_limits = |prefix: &str, gpus: &[GpuIdentity]| -> Vec<Profile> {
+        limits.iter().map(|&limits| profile(probe, prefix, limits, gpus)).collect()
+    };
+    let mut all = of_limits("", &[]);
+    let (software, real): (Vec<_>, Vec<_>) = gpus.iter().cloned().partition(|g| g.kind == GpuKind::Software);
+    for (gpu, name) in real.iter().zip(slug::gpus(&real)) {
+        all.extend(of_limits(&name, std::slice::from_ref(gpu)));
+    }
+    if real.len() > 1 {
+        all.push(profile(probe, "all-gpus", (None, None), &real));
+    }
+    match &software[..] {
+        [] => {}
+        [one] => all.push(profile(probe, "software-gpu", (None, None), std::slice::from_ref(one))),
+        [first, second, ..] => {
+            all.push(profile(probe, "two-gpus", (None, None), &[first.clone(), second.clone()]));
+        }
+    }
+    let repeated: Vec<Profile> = all.iter().filter(|p| ["full", "1t"].contains(&p.name.as_str())).cloned().collect();
+    all.extend(repeated.into_iter().map(|p| Profile { name: format!("{}-again", p.name), ..p }));
+    all
 }
 
-/// Whether this is the name of a report of that stem, of whatever day.
-pub(super) fn is_named(path: &Path, stem: &str) -> bool {
-    let name = path.file_name().and_then(|n| n.to_str());
-    let day = name.and_then(|n| n.strip_prefix(stem)?.strip_prefix("--")?.strip_suffix(".json"));
-    day.is_some_and(crate::date::is_day)
+fn profile(probe: &Probe, prefix: &str, (threads, simd): Limits, gpus: &[GpuIdentity]) -> Profile {
+    let mut words: Vec<String> = Vec::new();
+    words.extend((!prefix.is_empty()).then(|| prefix.to_owned()));
+    words.extend(simd.map(|level| level.to_string()));
+    words.extend(threads.map(|k| format!("{k}t")));
+    let quick = probe.quick || !gpus.is_empty();
+    let only: Vec<u32> = gpus.iter().map(|g| g.index).collect();
+    let own = Probe {
+        quick,
+        threads,
+        gpus: GpuChoice { no_gpus: only.is_empty(), only, software_gpus: false },
+        ..probe.clone()
+    };
+    let plan = Plan::new(quick, &probe.scenarios(), probe.max_objects);
+    Profile {
+        name: if words.is_empty() { "full".to_owned() } else { words.join("-") },
+        command: provenance::command(&own),
+        simd,
+        gpus: gpus.to_vec(),
+        time: plan.total + HARDWARE + GPU * gpus.len() as u32,
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::args::{Arguments, Verb};
+    use clap::Parser;
+
+    fn all(cores: u32, level: SimdLevel, gpus: &[GpuIdentity]) -> Vec<Profile> {
+        let words = ["sapwise", "probe", "--profiles", "--seed=3"];
+        let Verb::Probe(probe) = Arguments::try_parse_from(words).unwrap().verb else { panic!("another verb") };
+        profiles(&probe, cores, level, gpus)
+    }
+
+    fn gpu(index: u32, name: &str, kind: GpuKind) -> GpuIdentity {
+        GpuIdentity::new(index, name, kind)
+    }
 
     #[test]
-    fn names_of_other_profiles_and_other_machines_are_told_apart() {
-        assert_eq!(machine_stem("AMD EPYC", 2), "amd-epyc-2c");
-        let named = |name: &str| is_named(&Path::new("reports").join(name), "amd-epyc-2c-avx2");
-        assert!(named("amd-epyc-2c-avx2--2026-11-21.json"));
-        for other in ["amd-epyc-2c-avx2-1t--2026-11-21.json", "amd-epyc-2c-avx2--old.json", "amd-epyc-2c-avx2.json", ""]
-        {
-            assert!(!named(other), "{other}");
-        }
+    fn threads_halve_and_simd_levels_come_on_all_threads_and_on_one() {
+        let names = |cores, level| all(cores, level, &[]).into_iter().map(|p| p.name).collect::<Vec<_>>();
+        assert_eq!(names(1, SimdLevel::Portable), ["full", "full-again"]);
+        assert_eq!(
+            names(6, SimdLevel::Avx2),
+            ["full", "portable", "1t", "2t", "4t", "portable-1t", "full-again", "1t-again"]
+        );
+    }
+
+    #[test]
+    fn each_real_gpu_has_all_limits_and_software_adapters_one_report() {
+        let cards = [gpu(0, "NVIDIA H200", GpuKind::Discrete), gpu(1, "NVIDIA H200", GpuKind::Discrete)];
+        let programs = [gpu(2, "llvmpipe (LLVM 15)", GpuKind::Software), gpu(3, "SwiftShader", GpuKind::Software)];
+        let all = all(2, SimdLevel::Portable, &[&cards[..], &programs].concat());
+        let names: Vec<&str> = all.iter().map(|p| p.name.as_str()).collect();
+        let own = ["full", "1t", "nvidia-h200", "nvidia-h200-1t", "nvidia-h200-2", "nvidia-h200-2-1t"];
+        assert_eq!(names[..6], own);
+        assert_eq!(names[6..], ["all-gpus", "two-gpus", "full-again", "1t-again"]);
+        assert_eq!(all[1].command, "probe --no-gpus --threads 1 --seed 3");
+        assert_eq!(all[7].command, "probe --quick --gpu 2 --gpu 3 --seed 3");
+        assert_eq!(all[9].command, all[1].command);
+        assert!(Arguments::try_parse_from(format!("sapwise {}", all[7].command).split(' ')).is_ok());
     }
 }

@@ -1,4 +1,4 @@
-//! Where the frames of a replay come from.
+//! The source of a replay's frames.
 
 use crate::interrupt;
 use sapwise::Aabb;
@@ -13,7 +13,7 @@ pub(crate) enum FrameSource {
     Stream { name: String, frames: Frames },
 }
 
-/// The number of objects goes up and down: the first so many of the scene are shown.
+/// A number of objects that grows and shrinks: a frame shows the first ones of its scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Swing {
     /// Objects of the first frame and of the last.
@@ -23,10 +23,10 @@ pub(crate) struct Swing {
 }
 
 impl Swing {
-    /// Objects of a frame where there are at most so many: a straight line in their logarithm, up and down.
+    /// Objects of a frame of `most`: a straight line in their logarithm, up and down.
     fn objects(self, at: usize, most: usize) -> usize {
         let last = self.frames.saturating_sub(1);
-        // Of an even number of frames the two in the middle have all: halfway between them no frame would.
+        // Of an even number of frames the two in the middle show all objects.
         let steps = (last / 2).max(1);
         let share = at.min(last.saturating_sub(at)) as f64 / steps as f64;
         let (low, high) = ((self.least.max(1) as f64).ln(), (most.max(1) as f64).ln());

@@ -1,13 +1,9 @@
-//! The replay itself: the adaptive choice and every fixed algorithm take turns at the same frames.
+//! The turns of the adaptive choice and of every fixed algorithm at the same frames.
 
-use super::co_runner::{Slowdown, time_a_loop};
-use super::contestant::{Contestant, best};
-use super::frame::{Frame, Taken, Told};
-use super::oracle::Oracle;
+use super::frame_source::FrameSource;
 use super::other_work::OtherWork;
-use super::outcome::Outcome;
+use super::outcome::{Choice, Outcome, frames};
 use super::samples::Samples;
-use super::settings::ReplaySettings;
 use crate::interrupt;
 use crate::progress::Progress;
 use anyhow::{Context, bail};
@@ -17,79 +13,121 @@ use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Pairs, Reason, Reg
 use sapwise_scenes::Random;
 use std::time::Instant;
 
-/// Replays the frames: in each repeat the same frames again, and at each frame every contestant, in random order: a parallel algorithm leaves
-/// threads and caches behind that the next one feels.
+/// An algorithm is not timed again at a frame when even the faster of two samples there is this many times the best:
+/// its total is printed, and it can't be the best. A single sample may have found cold caches.
+const HOPELESS: f64 = 10.0;
+
+/// An algorithm is not timed at frames with as many objects as one that took it longer than this ...
+const TOO_LONG_NS: f64 = 1e9;
+/// ... and this many times as long as the best.
+const TOO_SLOW: f64 = 100.0;
+
+/// What to replay.
+#[derive(Debug)]
+pub(crate) struct ReplaySettings {
+    pub(crate) source: FrameSource,
+    pub(crate) frames: usize,
+    pub(crate) repeats: usize,
+    /// Seed of the order of turns.
+    pub(crate) seed: u64,
+    /// Whether the adaptive choice corrects the tuning by what frames took.
+    pub(crate) learning: bool,
+}
+
+/// Replays the frames: in each repeat the same frames again, and at each frame every contestant in random order,
+/// because a parallel algorithm leaves threads and caches behind that the next one feels.
 ///
-/// All of them start each repeat again without what they kept, the adaptive choice from this tuning, so that frame by frame the repeats are alike: what it
-/// has learned by a frame, it has learned from the frames before.
-///
-/// The pairs of all contestants are compared in the first repeat, outside the timed part.
+/// Every repeat starts with fresh algorithms and the tuning as it was given, so that the repeats are alike frame by
+/// frame. The first one compares the pairs of all contestants, outside the timed part.
 ///
 /// # Errors
-/// When no algorithm of the tuning can run, when contestants disagree about the pairs, or on Ctrl-C before one repeat is done.
+/// When no algorithm of the tuning can run, when contestants disagree about the pairs, or on Ctrl-C in the first
+/// repeat.
 pub(crate) fn replay(settings: &ReplaySettings, tuning: &Tuning, registry: &Registry) -> anyhow::Result<Outcome> {
-    let mut replay = Replay::new(settings, tuning, registry);
+    let mut race = Race::new(settings, tuning, registry);
     let progress = Progress::new((settings.repeats * settings.frames) as u64);
-    let mut watch = Watched::begin();
-    let mut done = 0;
-    'repeats: for repeat in 0..settings.repeats {
+    let (mut watch, mut loads) = (Watch::begin(), Vec::new());
+    for repeat in 0..settings.repeats {
         progress.message(format!("{}: repeat {} of {}", settings.source.name(), repeat + 1, settings.repeats));
-        let mut adaptive = replay.begin(repeat, tuning, registry)?;
+        let mut adaptive = race.begin(repeat, settings, tuning, registry)?;
+        let mut choices = Vec::with_capacity(settings.frames);
         let mut cursor = settings.source.start();
-        let mut co_runner = None;
         for frame in 0..settings.frames {
+            if interrupt::requested() && repeat == 0 {
+                bail!("interrupted before every frame was run once; there are no times");
+            }
             if interrupt::requested() {
-                break 'repeats;
+                return Ok(race.outcome(settings, &loads));
             }
-            if let Some(own) = settings.co_runner {
-                if co_runner.is_none() && frame >= own.from_frame {
-                    co_runner = Some(own.start().context("the co-runner can't be started")?);
-                }
-                replay.loops.push((frame, time_a_loop()));
+            race.turns(repeat, frame, cursor.boxes(), &mut adaptive)?;
+            choices.push(race.choice(&adaptive));
+            if watch.is_long_enough() {
+                loads.extend(watch.foreign_load());
+                watch = Watch::begin();
             }
-            replay.run(repeat, frame, cursor.boxes(), &mut adaptive)?;
-            watch.frame();
             cursor.advance();
             progress.advance(1);
         }
-        replay.end();
-        done = repeat + 1;
+        race.choices.push(choices);
     }
-    if done == 0 {
-        bail!("interrupted before every frame was run once; there are no figures");
-    }
-    Ok(replay.outcome(settings, done, watch.foreign_load()))
+    Ok(race.outcome(settings, &loads))
 }
 
-/// Algorithms of the tuning with more threads than the registry lists, as those of a larger machine have: the adaptive choice leaves them
-/// out. Where the tuning is steps it runs them all the same.
+/// Algorithms of a tuning with more threads than the registry lists: the adaptive choice leaves them out. When the
+/// tuning is steps it runs them all the same.
 pub(crate) fn too_wide<'a>(tuning: &'a Tuning, registry: &Registry) -> Vec<&'a AlgorithmId> {
     let most = registry.entries().iter().map(|e| e.id.threads()).max().unwrap_or(1);
     tuning.algorithms().into_iter().filter(|id| !tuning.costs.is_empty() && id.threads() > most).collect()
 }
 
-/// The contestants and what they have done so far.
-struct Replay {
+/// A fixed algorithm and its times.
+struct Contestant {
+    id: AlgorithmId,
+    /// `None` once it failed.
+    algorithm: Option<Box<dyn BroadPhase>>,
+    /// One entry a frame.
+    samples: Vec<Samples>,
+    /// It is not timed at frames with this many objects or more.
+    too_many: usize,
+}
+
+impl Contestant {
+    fn new(id: AlgorithmId, frames: usize, registry: &Registry) -> Result<Self, Error> {
+        let algorithm = Some(registry.create(&id)?);
+        Ok(Self { id, algorithm, samples: vec![Samples::default(); frames], too_many: usize::MAX })
+    }
+
+    /// Whether another sample at this frame would change nothing. `best` is the fastest sample of all contestants
+    /// there.
+    fn is_skipped(&self, frame: usize, objects: usize, best: f64) -> bool {
+        let samples = &self.samples[frame];
+        let hopeless = samples.len() >= 2 && samples.fastest() > HOPELESS * best;
+        self.algorithm.is_none() || objects >= self.too_many || hopeless
+    }
+
+    /// Notes whether a frame of this many objects took too long.
+    fn judge(&mut self, frame: usize, objects: usize, best: f64) {
+        let ns = self.samples[frame].fastest();
+        if ns.is_finite() && ns > TOO_LONG_NS && ns > TOO_SLOW * best {
+            self.too_many = self.too_many.min(objects);
+        }
+    }
+}
+
+/// The contestants and their times.
+struct Race {
     contestants: Vec<Contestant>,
     adaptive: Vec<Samples>,
     objects: Vec<usize>,
-    /// What the adaptive choice ran in the repeat under way, and in each one that is complete.
-    taken: Vec<Taken>,
-    repeats: Vec<Vec<Taken>>,
-    /// The same in its own words, of the repeat under way and of the last complete one.
-    telling: Vec<Told>,
-    told: Vec<Told>,
-    /// Times of the loop beside the frames.
-    loops: Vec<(usize, f64)>,
+    /// One list for each complete repeat.
+    choices: Vec<Vec<Choice>>,
     notes: Vec<String>,
     shuffle: Random,
     other_work: OtherWork,
     pairs: Pairs,
-    learning: bool,
-    exploring: bool,
 }
 
-impl Replay {
+impl Race {
     fn new(settings: &ReplaySettings, tuning: &Tuning, registry: &Registry) -> Self {
         let mut contestants: Vec<Contestant> = Vec::new();
         let mut notes: Vec<String> = Vec::new();
@@ -100,7 +138,7 @@ impl Replay {
                 Err(error) => notes.push(format!("{id} is left out: {error}")),
             }
         }
-        // Tuning may name a number of threads that the registry doesn't list but can make.
+        // A tuning may name a number of threads that the registry doesn't list but can make.
         let too_wide = too_wide(tuning, registry);
         for id in tuning.algorithms() {
             if !contestants.iter().any(|c| c.id == *id)
@@ -114,42 +152,48 @@ impl Replay {
             contestants,
             adaptive: vec![Samples::default(); settings.frames],
             objects: vec![0; settings.frames],
-            taken: Vec::new(),
-            repeats: Vec::new(),
-            telling: Vec::new(),
-            told: Vec::new(),
-            loops: Vec::new(),
+            choices: Vec::new(),
             notes,
             shuffle: Random::new(settings.seed),
             other_work: OtherWork::new(),
             pairs: Pairs::new(),
-            learning: settings.learning,
-            exploring: settings.exploring,
         }
     }
 
-    /// The adaptive choice of a repeat, with every contestant as fresh as it is.
-    fn begin(&mut self, repeat: usize, tuning: &Tuning, registry: &Registry) -> anyhow::Result<Adaptive> {
-        for contestant in self.contestants.iter_mut().filter(|_| repeat > 0) {
-            if let Err(error) = contestant.renew(registry) {
-                self.notes.push(format!("{} is left out from repeat {} on: {error}", contestant.id, repeat + 1));
+    /// Makes every algorithm anew, and returns the adaptive choice of a repeat.
+    fn begin(
+        &mut self,
+        repeat: usize,
+        settings: &ReplaySettings,
+        tuning: &Tuning,
+        registry: &Registry,
+    ) -> anyhow::Result<Adaptive> {
+        for contestant in self.contestants.iter_mut().filter(|c| repeat > 0 && c.algorithm.is_some()) {
+            // Dropped before the next one is made: a GPU may not have room for both.
+            contestant.algorithm = None;
+            match registry.create(&contestant.id) {
+                Ok(algorithm) => contestant.algorithm = Some(algorithm),
+                Err(error) => {
+                    self.notes.push(format!("{} is left out from repeat {} on: {error}", contestant.id, repeat + 1));
+                }
             }
         }
-        self.taken.clear();
-        self.telling.clear();
         let mut adaptive = Adaptive::new(tuning.clone(), registry)?;
-        adaptive.set_learning(self.learning);
-        adaptive.set_exploring(self.exploring);
+        adaptive.set_learning(settings.learning);
         Ok(adaptive)
     }
 
+    /// The fastest sample of any fixed algorithm at a frame.
+    fn best(&self, frame: usize) -> f64 {
+        self.contestants.iter().map(|c| c.samples[frame].fastest()).fold(f64::INFINITY, f64::min)
+    }
+
     /// Every contestant's turn at a frame.
-    fn run(&mut self, repeat: usize, frame: usize, boxes: &[Aabb], adaptive: &mut Adaptive) -> anyhow::Result<()> {
-        let count = self.contestants.len();
-        let best_before = best(&self.contestants, frame);
+    fn turns(&mut self, repeat: usize, frame: usize, boxes: &[Aabb], adaptive: &mut Adaptive) -> anyhow::Result<()> {
+        let best_before = self.best(frame);
         let mut answers: Vec<(usize, u64)> = Vec::new();
-        // The turn behind the last of the fixed ones is the adaptive choice's.
-        for k in self.shuffle.shuffled(count + 1) {
+        // The turn after the last of the fixed algorithms is the adaptive choice's.
+        for k in self.shuffle.shuffled(self.contestants.len() + 1) {
             if self.contestants.get(k).is_some_and(|c| c.is_skipped(frame, boxes.len(), best_before)) {
                 continue;
             }
@@ -161,7 +205,7 @@ impl Replay {
             };
             let ns = (started.elapsed().as_nanos() as f64).max(1.0);
             if let (Err(error @ Error::Unavailable { .. }), Some(contestant)) = (&result, self.contestants.get_mut(k)) {
-                // The algorithm is at fault and not the boxes: a GPU that was lost. The adaptive choice continues without it too.
+                // A GPU was lost: the algorithm is at fault and not the boxes, and the others continue.
                 self.notes.push(format!("{error}, at frame {frame}"));
                 contestant.algorithm = None;
                 continue;
@@ -173,16 +217,15 @@ impl Replay {
             }
         }
         self.compare(answers, frame)?;
-        self.listen(adaptive);
         self.objects[frame] = boxes.len();
-        let best = best(&self.contestants, frame);
+        let best = self.best(frame);
         self.contestants.iter_mut().for_each(|c| c.judge(frame, boxes.len(), best));
         Ok(())
     }
 
     /// Refuses answers that differ.
     fn compare(&self, mut answers: Vec<(usize, u64)>, frame: usize) -> anyhow::Result<()> {
-        // Whose turn came first says nothing about who is right; ours come first in the list, a user's after them.
+        // Our algorithms come before a user's in the list, so that the user's is named as the one that differs.
         answers.sort_unstable();
         if let Some(&(first, right)) = answers.first()
             && let Some(&(other, _)) = answers.iter().find(|answer| answer.1 != right)
@@ -196,85 +239,69 @@ impl Replay {
         Ok(())
     }
 
-    /// Notes what the adaptive choice decided.
-    fn listen(&mut self, adaptive: &Adaptive) {
+    fn choice(&self, adaptive: &Adaptive) -> Choice {
         let decision = adaptive.last_decision();
-        let chosen = decision.and_then(|d| self.contestants.iter().position(|c| c.id == *d.algorithm));
-        let explored = decision.is_some_and(|d| d.reason == Reason::Explored);
-        self.taken.push(Taken { chosen, explored });
-        self.telling.push(Told {
+        Choice {
+            chosen: decision.and_then(|d| self.contestants.iter().position(|c| c.id == *d.algorithm)),
             reason: decision.map_or(Reason::FellBack, |d| d.reason),
             load: decision.map(|d| d.load).unwrap_or_default(),
             predicted_ns: decision.and_then(|d| d.predicted_ns),
             measured_ns: decision.and_then(|d| d.measured_ns),
             runner_up: decision.and_then(|d| d.runner_up).map(|(id, ns)| (id.clone(), ns)),
-        });
+        }
     }
 
-    /// The repeat is complete.
-    fn end(&mut self) {
-        self.repeats.push(std::mem::take(&mut self.taken));
-        self.told = std::mem::take(&mut self.telling);
-    }
-
-    /// Who has a turn: one of the fixed algorithms, or the adaptive choice behind the last of them.
+    /// The name of whoever has a turn.
     fn name(&self, turn: usize) -> String {
         self.contestants.get(turn).map_or("the adaptive choice".to_owned(), |c| c.id.to_string())
     }
 
-    fn outcome(mut self, settings: &ReplaySettings, done: usize, foreign_load: Option<f64>) -> Outcome {
-        let frame = |at: usize| {
-            let own = |samples: &mut Samples| {
-                samples.cut(done);
-                std::mem::take(samples)
-            };
-            let fixed = self.contestants.iter_mut().map(|c| own(&mut c.samples[at])).collect();
-            let before = |repeat: &Vec<Taken>| at.checked_sub(1).map(|at| repeat[at]);
-            let taken: Vec<(Taken, Option<Taken>)> = self.repeats.iter().map(|r| (r[at], before(r))).collect();
-            Frame::new(self.objects[at], own(&mut self.adaptive[at]), fixed, &taken)
-        };
-        let frames: Vec<Frame> = (0..settings.frames).map(frame).collect();
-        let slowdown = |own| Slowdown::new(own, &self.loops);
+    fn outcome(mut self, settings: &ReplaySettings, loads: &[f64]) -> Outcome {
+        // A repeat that Ctrl-C cut short does not count.
+        let repeats = self.choices.len();
+        let complete = |samples: &Samples| samples.of(|repeat| repeat < repeats);
+        let adaptive: Vec<Samples> = self.adaptive.iter().map(complete).collect();
+        let of_frame = |at: usize| self.contestants.iter().map(|c| complete(&c.samples[at])).collect();
+        let fixed: Vec<Vec<Samples>> = (0..settings.frames).map(of_frame).collect();
         Outcome {
-            slowdown: settings.co_runner.map(slowdown),
+            frames: frames(&self.objects, &adaptive, &fixed, &self.choices),
+            choices: self.choices.pop().unwrap_or_default(),
             fixed: self.contestants.into_iter().map(|c| c.id).collect(),
-            oracle: Oracle::new(&frames),
-            windows: Oracle::of_windows(&frames),
-            frames,
-            repeats: self.repeats,
-            told: self.told,
-            interrupted: done < settings.repeats,
-            foreign_load,
+            repeats,
+            interrupted: repeats < settings.repeats,
+            foreign_load: median(loads),
             notes: self.notes,
         }
     }
 }
 
-/// The share of the CPU that other programs take, frame by frame.
-struct Watched {
-    watch: Watch,
-    /// Frames since it began.
-    frames: usize,
-    /// One for each frame of a window that was long enough to tell.
-    loads: Vec<f64>,
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-impl Watched {
-    fn begin() -> Self {
-        Self { watch: Watch::begin(), frames: 0, loads: Vec::new() }
+    fn timed(ns: &[f64]) -> Contestant {
+        let mut contestant = Contestant::new("brute@cpu1".parse().unwrap(), 1, &Registry::with_cores(1)).unwrap();
+        ns.iter().enumerate().for_each(|(repeat, &ns)| contestant.samples[0].push(repeat, ns));
+        contestant
     }
 
-    /// A frame has run.
-    fn frame(&mut self) {
-        self.frames += 1;
-        if self.watch.is_long_enough() {
-            let load = self.watch.foreign_load();
-            self.loads.extend(load.into_iter().flat_map(|load| std::iter::repeat_n(load, self.frames)));
-            (self.watch, self.frames) = (Watch::begin(), 0);
-        }
+    #[test]
+    fn a_hopeless_one_is_not_timed_again_and_one_cold_sample_is_no_proof() {
+        assert!(!timed(&[500.0]).is_skipped(0, 9, 10.0));
+        assert!(!timed(&[500.0, 90.0]).is_skipped(0, 9, 10.0));
+        assert!(timed(&[500.0, 110.0]).is_skipped(0, 9, 10.0));
     }
 
-    fn foreign_load(&self) -> Option<f64> {
-        median(&self.loads)
+    #[test]
+    fn too_long_a_frame_is_the_last_with_as_many_objects() {
+        let skipped = |ns: f64, best: f64| {
+            let mut contestant = timed(&[ns]);
+            contestant.judge(0, 1000, best);
+            [999, 1000].map(|objects| contestant.is_skipped(0, objects, best))
+        };
+        assert_eq!(skipped(900e6, 10e6), [false, false]);
+        assert_eq!(skipped(1.1e9, 10e6), [false, true]);
+        // As slow, but not far behind the best.
+        assert_eq!(skipped(1.1e9, 100e6), [false, false]);
     }
 }

@@ -1,34 +1,33 @@
-//! Which algorithms of a race need more frames, and when none does.
+//! The stopping rule of a race: which algorithms need more frames, and when none does.
 //!
-//! What a probe is for is the choice between the best. One that is far behind gets the few samples that its cost curve needs;
-//! two that lie close get samples until it is clear which is faster, or that it does not matter.
+//! A probe decides between the best. One that is far behind gets the few samples that its cost curve needs; two that
+//! are close get samples until it is clear which is faster, or that it does not matter.
 
 use sapwise::stats::{median, relative_iqr};
 use sapwise_lab::sweep::median as median_ns;
 
-/// Frames at least.
+/// Fewest frames before anything is decided.
 pub(super) const FEW_FRAMES: usize = 5;
-/// Who is surely slower than the best by more than this factor takes no further part at a point.
+/// An algorithm that is surely slower than the best by more than this factor rests for the remainder of the point.
 const BEATEN: f64 = 1.5;
 /// Standard errors that count as sure.
 const SURE: f64 = 3.0;
-/// Where two differ by less than this, it does not matter which is chosen: the goal for the regret of measured tuning is 0.5 %.
+/// A difference below this does not matter: the goal for the regret of a measured tuning is 0.5 %.
 const INDIFFERENT: f64 = 0.005;
-/// Standard error of a median over the median that is good enough for a cost curve. Below it the differences between one visit
-/// to a point and the next are larger.
+/// Relative standard error of a median that is good enough for a cost curve: visits to the same point differ by more.
 const GOOD_ERROR: f64 = 0.02;
 
 /// The standing of those who take part.
 #[derive(Debug, PartialEq)]
 pub(super) struct Contest {
-    /// Positions, in the list that was judged, of those who are surely beaten.
+    /// Positions of those who are surely beaten in the list that was judged.
     pub(super) beaten: Vec<usize>,
     /// Whether more frames would change nothing.
     pub(super) decided: bool,
 }
 
 impl Contest {
-    /// Judges lists of samples whose k-th entries belong to the same frame. Nothing is decided below [`FEW_FRAMES`].
+    /// Judges lists of samples whose k-th entries belong to the same frame.
     pub(super) fn judge(samples: &[&[u64]]) -> Self {
         let medians: Vec<Option<f64>> = samples.iter().map(|s| median_ns(s)).collect();
         let leader = (0..samples.len()).filter(|&k| samples[k].len() >= FEW_FRAMES).min_by(|&a, &b| {
@@ -54,7 +53,7 @@ impl Contest {
     }
 }
 
-/// Median over the frames of the logarithm of one time over another, and its standard error. `None` with too few frames.
+/// Returns the median over the frames of the logarithm of a ratio of times, and its standard error.
 fn behind(samples: &[u64], leader: &[u64]) -> Option<(f64, f64)> {
     if samples.len().min(leader.len()) < FEW_FRAMES {
         return None;
@@ -63,13 +62,14 @@ fn behind(samples: &[u64], leader: &[u64]) -> Option<(f64, f64)> {
     Some((median(&ratios)?.ln(), standard_error(&ratios)))
 }
 
-/// Standard error of the median over the median. Infinite below four samples, which have no quartiles.
+/// Returns the relative standard error of the median, infinite below four samples.
 fn error(samples: &[u64]) -> f64 {
     standard_error(&samples.iter().map(|&ns| ns as f64).collect::<Vec<f64>>())
 }
 
-/// From the quartiles, so that single outliers don't count: for a normal distribution the standard deviation is the interquartile
-/// range over 1.349, and the error of the median is 1.2533 standard deviations over the root of the number of samples.
+/// Takes the standard error from the quartiles, so that single outliers don't count. For a normal distribution the
+/// standard deviation is the interquartile range over 1.349, and the error of the median is 1.2533 standard
+/// deviations over √n.
 fn standard_error(samples: &[f64]) -> f64 {
     relative_iqr(samples).map_or(f64::INFINITY, |iqr| 1.2533 / 1.349 * iqr / (samples.len() as f64).sqrt())
 }

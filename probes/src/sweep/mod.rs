@@ -1,12 +1,12 @@
-//! The sweep: every algorithm on the same frames of seeded scenes, over sizes and scenarios.
+//! The sweep: every algorithm on the same frames of seeded scenes, over scenarios and sizes.
 
-mod adaptive_sampling;
 mod contest;
 mod race;
 mod request;
 mod runner;
 mod scenario;
 mod verify;
+mod visits;
 
 pub(crate) use request::SweepRequest;
 pub(crate) use runner::{Conditions, Found, sweep_all};

@@ -1,7 +1,7 @@
 //! One point: every algorithm on the same frames, in random order within each.
 //!
-//! An incremental algorithm has a bias in its favour here: it rebuilds what it keeps once in 20 to 100 frames, and the median leaves those
-//! frames out. Nor does its margin settle in the frames there are: what is measured is the margin with which it begins.
+//! Medians favour an incremental algorithm: they leave out its rebuilds, one frame in 20 to 100. Nor does its margin
+//! settle within so few frames.
 
 use super::contest::{Contest, FEW_FRAMES};
 use super::verify::Answer;
@@ -12,13 +12,14 @@ use sapwise_lab::sweep::{WARM_UP, next_frame};
 use sapwise_scenes::{Random, Scene};
 use std::time::{Duration, Instant};
 
-/// Frames at most: beyond this the error of a median falls too slowly to be worth the time.
+/// Most frames: beyond this the error of a median falls too slowly to be worth the time.
 const MOST_FRAMES: usize = 40;
-/// Frames at least where the point's time is over.
+/// Fewest frames when the time of the point is over.
 pub(super) const FEWEST_FRAMES: usize = 3;
-/// Windows that may be thrown away for each that is kept: on a machine that is always busy more would only cost time.
+/// Windows thrown away for each one that is kept, at most: on a machine that is always busy more would only take
+/// time.
 const MOST_REDONE: u32 = 2;
-/// Share of a point's time in which spoiled frames are redone. After that they are kept, with the foreign load beside them.
+/// Share of a point's time in which spoiled frames are redone. Later ones are kept with the foreign load beside them.
 const REDO_SHARE: f64 = 2.0 / 3.0;
 
 /// An algorithm in the race.
@@ -28,7 +29,7 @@ pub(crate) struct Racer {
     is_incremental: bool,
     /// Samples of this point.
     samples: Vec<u64>,
-    /// Why it can't go on, if it can't.
+    /// Why it left the race, if it did.
     pub(crate) error: Option<String>,
     /// Whether it takes no further part at this point.
     rests: bool,
@@ -43,34 +44,32 @@ impl Racer {
     }
 }
 
-/// What the algorithms of a race share.
+/// The state that all algorithms of a race share.
 pub(crate) struct Race {
     /// One list for all, so that its memory is equally warm for each.
     pairs: Pairs,
     naive: Pairs,
     shuffle: Random,
-    /// Of the frame before.
     displacement: Displacement,
     /// Cores that algorithms may use.
     cores: Options,
-    contended: bool,
 }
 
-/// What a point cost beside what it found.
+/// A point, and the time that it took.
 pub(crate) struct Raced {
     pub(crate) point: Point,
-    /// Wall clock of the shortest frame in which nobody rested, everything included: a single frame that was disturbed must not
-    /// cost the next size.
+    /// Wall clock of the shortest frame in which nobody rested, everything included. The shortest, because a
+    /// disturbed frame must not cost the next size.
     pub(crate) frame: Duration,
-    /// Wall clock of the frames before the samples, all taken to be as short as the shortest.
+    /// Wall clock of the warm-up, every frame counted as the shortest of them.
     pub(crate) warm_up: Duration,
     /// Wrong answers.
     pub(crate) mismatches: Vec<String>,
 }
 
 impl Race {
-    /// `pair_limit` bounds the memory: a scene with more pairs ends the race with an error instead of the process.
-    pub(crate) fn new(seed: u64, pair_limit: usize, cores: u32, contended: bool) -> Self {
+    /// `pair_limit` bounds the memory: an algorithm that finds more pairs leaves the race with an error.
+    pub(crate) fn new(seed: u64, pair_limit: usize, cores: u32) -> Self {
         let mut pairs = Pairs::new();
         pairs.set_limit(Some(pair_limit));
         Self {
@@ -79,18 +78,17 @@ impl Race {
             shuffle: Random::new(seed),
             displacement: Displacement::default(),
             cores: Options::default().with_threads(Some(cores)),
-            contended,
         }
     }
 
-    /// Runs `racers` on frame after frame of `scene` until it is clear which is the fastest or `time` is over. Those who are surely
-    /// beaten rest from then on, so that their samples are the first of the point's.
+    /// Runs `racers` on frame after frame of `scene` until it is clear which is the fastest or `time` is over. Those
+    /// who are surely beaten rest from then on, so that their samples are the first ones of the point.
     pub(crate) fn run(&mut self, racers: &mut [Racer], scene: &mut Scene, time: Duration) -> Raced {
         let began = Instant::now();
         let mut mismatches = Vec::new();
         racers.iter_mut().for_each(Racer::begin);
         let core_to_core = core_to_core_ns(&self.cores);
-        // The first frame warms the buffers, the thread pools and the branch predictors, and is not counted.
+        // The first frame warms buffers, thread pools and branch predictors, and is not counted.
         self.frame(racers, scene, |_| true, &mut mismatches);
         let mut warm_up = Duration::ZERO;
         let is_incremental = |r: &Racer| r.error.is_none() && r.is_incremental;
@@ -109,7 +107,7 @@ impl Race {
         let mut shortest = Duration::MAX;
         let mut mean_load = MeanLoad::default();
         loop {
-            // Samples are kept or thrown away by windows that are long enough to tell foreign load.
+            // Samples are kept or thrown away by windows that are long enough to measure foreign load.
             let watch = Watch::begin();
             let mut fresh = 0;
             let load_before = mean_load;
@@ -123,12 +121,11 @@ impl Race {
                 fresh += 1;
             }
             let foreign = watch.foreign_load();
-            // Thousands of small frames fit into a window; some are enough, from all over the window: for milliseconds at a time a
-            // machine wakes threads faster or slower.
+            // Thousands of small frames fit into a window. The samples come from all over it, because a machine wakes
+            // threads faster or slower for milliseconds at a time.
             let kept = fresh.min(MOST_FRAMES - frames);
             let spent = began.elapsed();
-            let redo = !self.contended
-                && thrown < MOST_REDONE * (windows + 1)
+            let redo = thrown < MOST_REDONE * (windows + 1)
                 && foreign.is_some_and(|f| f > Watch::SPOILING)
                 && spent + shortest * (fresh as u32) < time.mul_f64(REDO_SHARE);
             for racer in racers.iter_mut() {
@@ -163,8 +160,8 @@ impl Race {
         Raced { point, frame: shortest, warm_up, mismatches }
     }
 
-    /// Advances the scene, times every racer that `takes_part` on the new frame and compares their answers. Returns the pairs
-    /// of the frame before this one.
+    /// Advances the scene, times every racer that `takes_part` on the new frame and compares their answers. Returns
+    /// the number of pairs in the previous frame.
     fn frame(
         &mut self,
         racers: &mut [Racer],
@@ -186,7 +183,7 @@ impl Race {
             let result = racer.algorithm.find_pairs(boxes, &mut self.pairs);
             let elapsed = started.elapsed();
             match result {
-                // A clock that ticks slower than the frame must not give 0, which no frame takes.
+                // A clock that ticks slower than the frame gives 0, which no report may hold.
                 Ok(()) => {
                     racer.samples.push((elapsed.as_nanos() as u64).max(1));
                     racer.answer = Some(Answer::of(&self.pairs));
@@ -199,7 +196,7 @@ impl Race {
     }
 
     fn verify(&mut self, racers: &mut [Racer], boxes: &[Aabb], mismatches: &mut Vec<String>) {
-        // Without the double loop the first of the list is taken to be right: it is the simplest that is left.
+        // For large frames the first of the list counts as right: it is the simplest that is left.
         let first = racers.iter().find_map(|r| r.answer);
         let Some(right) = Answer::naive(boxes, &mut self.naive).or(first) else { return };
         for racer in racers.iter_mut() {
@@ -210,12 +207,12 @@ impl Race {
         }
     }
 
-    /// The load of the frame that ran, with the pairs of the one before.
+    /// The load of the frame that ran, with the pairs of the previous one.
     fn load(&self, scene: &Scene, before: Option<u64>) -> Load {
         Load::estimate(scene.boxes(), before.map(|pairs| pairs as f64), self.displacement.moved(scene.boxes()))
     }
 
-    /// What was found, without what the machine did meanwhile.
+    /// The point without foreign load and core-to-core latency.
     fn point(&self, racers: &[Racer], scene: &Scene, load: Load) -> Point {
         let answer = racers.iter().filter(|r| r.error.is_none()).find_map(|r| r.answer);
         let answer = answer.unwrap_or(Answer { pairs: 0, fingerprint: 0 });
@@ -237,8 +234,8 @@ impl Race {
     }
 }
 
-/// The mean load of frames with the same number of objects. That of any one of them may be unlike most: where all objects jump in every
-/// 30th frame, a race of few frames may end with that one.
+/// The mean load of frames with the same number of objects. A single frame may be unlike the others: `teleport` jumps
+/// in every 30th.
 #[derive(Debug, Clone, Copy, Default)]
 struct MeanLoad {
     frames: f64,
@@ -265,7 +262,7 @@ impl MeanLoad {
 }
 
 impl Racer {
-    /// Makes it ready for a point.
+    /// Prepares it for a point.
     fn begin(&mut self) {
         self.samples.clear();
         self.rests = false;
@@ -275,7 +272,7 @@ impl Racer {
         self.error.is_none() && !self.rests
     }
 
-    /// Of the samples from `from` on keeps this many, evenly spaced. A racer that failed or rests has none there.
+    /// Keeps this many of the samples from `from` on, evenly spaced. A racer that failed or rests has none there.
     fn keep(&mut self, from: usize, kept: usize) {
         let fresh = self.samples.len().saturating_sub(from);
         if fresh > 0 {
@@ -284,7 +281,7 @@ impl Racer {
         }
     }
 
-    /// Takes the algorithm out of the race. Its samples of this point go too: they may stand for wrong answers.
+    /// Takes the algorithm out of the race and drops its samples of this point, which may belong to wrong answers.
     fn fail(&mut self, reason: String) {
         self.samples.clear();
         self.error = Some(reason);
@@ -330,7 +327,7 @@ mod tests {
             Racer::new("brute@cpu1".parse().unwrap(), right()),
         ];
         let mut scene = sapwise_scenes::Scenario::Uniform.start(50, 1);
-        let outcome = Race::new(1, 1000, 1, false).run(&mut racers, &mut scene, Duration::from_millis(1));
+        let outcome = Race::new(1, 1000, 1).run(&mut racers, &mut scene, Duration::from_millis(1));
         assert_eq!(outcome.mismatches.len(), 1);
         assert!(outcome.mismatches[0].starts_with("wrong@cpu1"), "{:?}", outcome.mismatches);
         let timings = &outcome.point.timings;
@@ -366,7 +363,7 @@ mod tests {
             };
             let mut racers = vec![racer(0), racer(1)];
             let mut scene = sapwise_scenes::Scenario::Resting.start(1, 1);
-            let outcome = Race::new(1, 1000, 1, true).run(&mut racers, &mut scene, Duration::ZERO);
+            let outcome = Race::new(1, 1000, 1).run(&mut racers, &mut scene, Duration::ZERO);
             assert!(outcome.mismatches.is_empty(), "{:?}", outcome.mismatches);
             assert!((0.0..=0.06).contains(&outcome.point.load.moved));
             frames.map(|f| f.load(Relaxed))
@@ -390,7 +387,7 @@ mod tests {
         let brute = sapwise::Registry::new().create(&"brute@cpu1".parse().unwrap()).unwrap();
         let mut racers = vec![Racer::new("brute@cpu1".parse().unwrap(), brute)];
         let mut scene = sapwise_scenes::Scenario::Uniform.start(500, 1);
-        let outcome = Race::new(1, 3, 1, false).run(&mut racers, &mut scene, Duration::from_millis(1));
+        let outcome = Race::new(1, 3, 1).run(&mut racers, &mut scene, Duration::from_millis(1));
         assert!(outcome.point.timings[0].error.as_ref().unwrap().contains("limit of 3"));
     }
 }

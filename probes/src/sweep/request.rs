@@ -1,10 +1,10 @@
-//! What a sweeping process is told, and what it tells.
+//! The request to a sweeping process and its events.
 
 use sapwise::{AlgorithmId, GpuIdentity};
 use sapwise_lab::report::Point;
 use serde::{Deserialize, Serialize};
 
-/// The sweep of one scenario, as it is handed to a process of its own.
+/// The sweep of one scenario by a process of its own.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SweepRequest {
@@ -18,19 +18,17 @@ pub(crate) struct SweepRequest {
     pub(crate) seed: u64,
     /// Time for all sizes.
     pub(crate) seconds: f64,
-    /// The GPUs that algorithms may use, as they were when the hardware was measured.
+    /// The GPUs that algorithms may use, as seen when the hardware was measured.
     pub(crate) gpus: Vec<GpuIdentity>,
-    /// Whether foreign load is wanted, so that it spoils nothing.
-    pub(crate) contended: bool,
 }
 
-/// Which sizes, and who takes part.
+/// The sizes, and the algorithms at each.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Schedule {
     /// Every algorithm through these numbers of objects, ascending, until it leaves the race.
     Ascent(Vec<u32>),
-    /// Where the choice is in doubt, in this order.
+    /// Single points in this order.
     Visits(Vec<Visit>),
 }
 
@@ -44,26 +42,26 @@ impl Schedule {
     }
 }
 
-/// One more point, of those algorithms between which the choice lies.
+/// Another point for the algorithms that are close there.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Visit {
     /// Number of objects.
     pub(crate) objects: u32,
-    /// Time for it.
+    /// Time for the point.
     pub(crate) seconds: f64,
-    /// Who takes part; two or more.
+    /// The algorithms, two or more.
     pub(crate) algorithms: Vec<AlgorithmId>,
 }
 
-/// What a sweeping process prints, one a line.
+/// A line that a sweeping process prints.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Event {
     /// A size is done.
     Point(Box<Point>),
-    /// Something that the reader of the report should know.
+    /// A remark for the report.
     Remark(String),
-    /// An algorithm returned a wrong answer. The report is kept, and the probe has failed.
+    /// An algorithm returned a wrong answer: the report is kept, and the probe fails.
     Mismatch(String),
 }

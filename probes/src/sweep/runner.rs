@@ -1,7 +1,7 @@
-//! Runs the whole sweep: each scenario in a process of its own.
+//! The whole sweep, each scenario in a process of its own: a crash costs one scenario.
 
-use super::adaptive_sampling;
 use super::request::{Event, Schedule, SweepRequest};
+use super::visits::visits;
 use crate::child::{Ended, run_part};
 use crate::interrupt;
 use crate::progress::Progress;
@@ -12,13 +12,13 @@ use sapwise_lab::sweep::Plan;
 use sapwise_scenes::Random;
 use std::time::{Duration, Instant};
 
-/// What a scenario may take beyond its time: start-up, the first scene and a last frame that was forecast too short.
+/// Time of a scenario beyond its own: start-up, the first scene, and a last frame that was forecast too short.
 const GRACE: Duration = Duration::from_secs(20);
 
-/// What the process of a scenario takes to start, threads included.
+/// Time to start the process of a scenario, threads included.
 const START: Duration = Duration::from_millis(150);
 
-/// What a sweep has found so far.
+/// The results of a sweep.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Found {
     pub(crate) points: Vec<Point>,
@@ -29,16 +29,15 @@ pub(crate) struct Found {
     pub(crate) interrupted: bool,
 }
 
-/// What is the same for all scenarios of a sweep.
+/// The conditions of all scenarios of a sweep.
 pub(crate) struct Conditions {
     pub(crate) cores: u32,
     pub(crate) seed: u64,
-    pub(crate) contended: bool,
     /// The GPUs to sweep.
     pub(crate) gpus: Vec<GpuIdentity>,
 }
 
-/// Sweeps every scenario of a plan. `keep` is called after each of them, so that nothing measured is lost.
+/// Sweeps every scenario of a plan, and calls `keep` after each one, so that nothing measured is lost.
 ///
 /// # Errors
 /// When no process can be started. A scenario that crashes is a remark, not an error.
@@ -57,14 +56,14 @@ pub(crate) fn sweep_all(plan: &Plan, conditions: &Conditions, keep: &mut dyn FnM
     for round in 1..=plan.rounds {
         let left = plan.total.saturating_sub(began.elapsed()) / (plan.rounds + 1 - round);
         let starts = START * plan.ascents.len() as u32;
-        for (scenario, mut visits) in adaptive_sampling::visits(&sweep.found.points, left.saturating_sub(starts)) {
+        for (scenario, mut visits) in visits(&sweep.found.points, left.saturating_sub(starts)) {
             let time = START + Duration::from_secs_f64(visits.iter().map(|v| v.seconds).sum());
-            // In random order, so that a machine that slows down does not pass for a longer time at large sizes.
+            // In random order, so that a machine that slows down does not make large sizes look slower.
             let order = shuffle.shuffled(visits.len());
             visits = order.into_iter().map(|k| visits[k].clone()).collect();
             let before = sweep.found.points.len();
             let goes_on = sweep.go(&scenario, Schedule::Visits(visits), time, u64::from(round))?;
-            // A round is told from the next by its sizes, which ascend in each.
+            // Readers tell rounds apart by their ascending sizes.
             sweep.found.points[before..].sort_by_key(|p| p.load.objects);
             if !goes_on {
                 return Ok(sweep.found);
@@ -75,7 +74,7 @@ pub(crate) fn sweep_all(plan: &Plan, conditions: &Conditions, keep: &mut dyn FnM
     Ok(sweep.found)
 }
 
-/// A sweep on its way.
+/// A sweep under way.
 struct Sweep<'a> {
     plan: &'a Plan,
     conditions: &'a Conditions,
@@ -103,7 +102,7 @@ impl Sweep<'_> {
             Ended::Badly(how) => {
                 self.found.remarks.push(format!("{scenario} is incomplete: its process {how}"));
                 self.found.failed = true;
-                // Whatever it was, a driver is the first to be suspected.
+                // A driver is the most likely cause.
                 if !self.gpus.is_empty() {
                     let why = "whose process did not end well";
                     self.found.remarks.push(format!("GPUs are left out after {scenario}, {why}"));
@@ -122,11 +121,10 @@ impl Sweep<'_> {
             scenario: scenario.to_owned(),
             schedule,
             cores: self.conditions.cores,
-            // Another scene of the same kind: what depends on one scene alone would pass for a property of the machine.
+            // Another scene each round: a property of one scene must not look like one of the machine.
             seed: self.conditions.seed.wrapping_add(round),
             seconds: time.as_secs_f64(),
             gpus: self.gpus.clone(),
-            contended: self.conditions.contended,
         };
         let text = serde_json::to_string(&request)?;
         let Self { plan, gpus, began, progress, found, .. } = self;

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 /// Most pairs in a frame, 8 bytes each: 256 MB, and as much again in the threads of an algorithm.
 const PAIR_LIMIT: usize = 32 << 20;
 
-/// Runs the algorithms of a registry through the schedule of a request and hands on each event.
+/// Runs the algorithms of a registry through the schedule of a request, and hands on each event.
 ///
 /// # Errors
 /// When the scenario is unknown or `emit` fails.
@@ -38,13 +38,13 @@ pub(crate) fn sweep(
             Err(error) => emit(Event::Remark(format!("{scenario}: {id} is left out: {error}")))?,
         }
     }
-    // From here on: opening a GPU takes seconds, and is not the time of any size.
+    // From here on: opening a GPU takes seconds and belongs to no size.
     let end = Instant::now() + Duration::try_from_secs_f64(request.seconds).unwrap_or_default();
     let own = ScenarioSweep {
         scenario,
         seed: request.seed,
         end,
-        race: Race::new(request.seed, PAIR_LIMIT, request.cores, request.contended),
+        race: Race::new(request.seed, PAIR_LIMIT, request.cores),
         emit,
     };
     match &request.schedule {
@@ -53,7 +53,7 @@ pub(crate) fn sweep(
     }
 }
 
-/// What both kinds of schedule share.
+/// The sweep of one scenario.
 struct ScenarioSweep<'a> {
     scenario: Scenario,
     seed: u64,
@@ -63,7 +63,7 @@ struct ScenarioSweep<'a> {
 }
 
 impl ScenarioSweep<'_> {
-    /// Everyone through all sizes, until they leave the race or the time is over.
+    /// Runs everyone through all sizes, until they leave the race or the time is over.
     fn ascend(mut self, mut racers: Vec<Racer>, sizes: &[u32], seconds: f64) -> anyhow::Result<()> {
         let scenario = self.scenario;
         let mut standings = vec![Standing::default(); racers.len()];
@@ -80,7 +80,9 @@ impl ScenarioSweep<'_> {
                     ));
                 }
                 keep_racing(&mut racers, &mut standings);
-                self.remark(format!("{scenario}: after {reached} objects only the fastest algorithms were timed, to stay within {seconds:.0} s"))?;
+                self.remark(format!(
+                    "{scenario}: after {reached} objects only the fastest algorithms were timed, to stay within {seconds:.0} s"
+                ))?;
             }
             let outcome = self.point(&mut racers, objects, left.mul_f64(share(&sizes[k..])))?;
             let best_ns = judge(&mut standings, &outcome.point, objects);
@@ -94,7 +96,7 @@ impl ScenarioSweep<'_> {
         Ok(())
     }
 
-    /// Single points, in the order given, until the time is over. Nothing is said of visits that are left then: none was promised.
+    /// Runs single points in the order given, until the time is over. Visits that are left then are dropped silently.
     fn visit(mut self, mut racers: Vec<Racer>, visits: &[Visit]) -> anyhow::Result<()> {
         let order: Vec<AlgorithmId> = racers.iter().map(|r| r.id.clone()).collect();
         for visit in visits {
@@ -111,13 +113,13 @@ impl ScenarioSweep<'_> {
             }
             racers = resting;
             racers.append(&mut racing);
-            // The first of the list is what the answers of large frames are held against.
+            // The answers of large frames are compared with that of the first.
             racers.sort_by_key(|r| order.iter().position(|id| *id == r.id));
         }
         Ok(())
     }
 
-    /// One size, with what was wrong told.
+    /// Runs one size and reports wrong answers.
     fn point(&mut self, racers: &mut [Racer], objects: u32, time: Duration) -> anyhow::Result<Raced> {
         let mut scene = self.scenario.start(objects as usize, self.seed);
         let mut outcome = self.race.run(racers, &mut scene, time);
@@ -132,8 +134,8 @@ impl ScenarioSweep<'_> {
     }
 }
 
-/// Adds the algorithms on those of these GPUs that are still there, and returns what keeps others from running.
-fn add_gpus(registry: &mut Registry, wanted: &[GpuIdentity]) -> Vec<String> {
+/// Adds the algorithms on those of these GPUs that are still there, and returns a remark for each of the others.
+pub(crate) fn add_gpus(registry: &mut Registry, wanted: &[GpuIdentity]) -> Vec<String> {
     if wanted.is_empty() {
         return Vec::new();
     }
@@ -146,38 +148,39 @@ fn add_gpus(registry: &mut Registry, wanted: &[GpuIdentity]) -> Vec<String> {
     gone.collect()
 }
 
-/// The size before.
+/// The previous size.
 struct Before {
     objects: u32,
     /// Wall clock of a frame with all algorithms.
     frame: Duration,
-    /// Wall clock of the frames before the samples.
+    /// Wall clock of the warm-up.
     warm_up: Duration,
-    /// Median of the best.
+    /// Median of the best algorithm.
     best_ns: f64,
 }
 
 impl Before {
-    /// The time that a size takes at least.
+    /// Returns the least time that a size takes.
     fn forecast(&self, objects: u32) -> Duration {
-        // Between the exponents of `grid-sap` (1) and of a sweep on one axis (5/3). Too low a forecast costs some seconds
-        // beyond the time, too high a one costs the last size.
+        // Between the exponents of `grid-sap` (1) and of a sweep on one axis (5/3). A forecast that is too low costs
+        // some seconds; one that is too high costs the last size.
         let growth = (f64::from(objects) / f64::from(self.objects)).powf(1.25);
         (self.warm_up + self.frame * (FEWEST_FRAMES as u32)).mul_f64(growth)
     }
 
-    /// Takes the slow out of the race and their time out of the frame. Whether there were any.
+    /// Takes slow algorithms out of the race and their time out of the frame. Returns whether there were any.
     fn leave_out_slow(&mut self, standings: &mut [Standing]) -> bool {
         let ratios: f64 = standings.iter_mut().filter_map(Standing::leave_if_slow).sum();
         let of_best = |times: f64| Duration::try_from_secs_f64(times * self.best_ns / 1e9).unwrap_or_default();
-        // The medians that are taken off may add up to more than the shortest frame; those who stay take at least this.
+        // The medians that are taken off may add up to more than the shortest frame; those who stay take at least
+        // this.
         let staying = standings.iter().filter(|s| !s.out).count();
         self.frame = self.frame.saturating_sub(of_best(ratios)).max(of_best(staying as f64));
         ratios > 0.0
     }
 }
 
-/// Lets every standing know how its algorithm did, and returns the median of the best.
+/// Judges every algorithm, and returns the median of the best.
 fn judge(standings: &mut [Standing], point: &Point, objects: u32) -> f64 {
     let medians: Vec<Option<f64>> = point.timings.iter().map(|t| median(&t.samples_ns)).collect();
     let best = medians.iter().flatten().copied().fold(f64::INFINITY, f64::min);
@@ -203,7 +206,7 @@ mod tests {
 
     fn request(scenario: &str, sizes: &[u32], seconds: f64) -> SweepRequest {
         let (scenario, schedule) = (scenario.to_owned(), Schedule::Ascent(sizes.to_vec()));
-        SweepRequest { scenario, schedule, cores: 2, seed: 3, seconds, gpus: Vec::new(), contended: false }
+        SweepRequest { scenario, schedule, cores: 2, seed: 3, seconds, gpus: Vec::new() }
     }
 
     fn events(request: &SweepRequest) -> Vec<Event> {

@@ -1,11 +1,11 @@
-//! Whether every algorithm found the same pairs, checked outside the timed region.
+//! Comparison of the pairs that the algorithms found, outside the timed region.
 
 use sapwise::{Aabb, Pairs};
 
-/// Up to this many boxes the answer is also compared with a double loop that shares no code with any algorithm.
+/// Up to this many boxes a double loop that shares no code with any algorithm gives the right answer.
 pub(crate) const NAIVE_OBJECTS: usize = 2000;
 
-/// What an answer is compared by.
+/// What answers are compared by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Answer {
     pub(crate) pairs: u64,
@@ -17,7 +17,7 @@ impl Answer {
         Self { pairs: pairs.len() as u64, fingerprint: pairs.fingerprint() }
     }
 
-    /// The answer of the double loop, for frames that are small enough.
+    /// Returns the answer of the double loop; `None` for large frames.
     pub(crate) fn naive(boxes: &[Aabb], scratch: &mut Pairs) -> Option<Self> {
         if boxes.len() > NAIVE_OBJECTS {
             return None;
@@ -25,7 +25,7 @@ impl Answer {
         scratch.clear();
         for (j, b) in boxes.iter().enumerate() {
             for (i, a) in boxes[..j].iter().enumerate() {
-                // Written out here: Aabb::overlaps is what is under test.
+                // Written out here, because Aabb::overlaps is under test.
                 let apart = (0..3).any(|k| a.max[k] < b.min[k] || b.max[k] < a.min[k]);
                 if !apart {
                     scratch.push(i as u32, j as u32);
@@ -36,7 +36,7 @@ impl Answer {
         Some(Self::of(scratch))
     }
 
-    /// How this answer differs from the right one, if it does.
+    /// Returns how this answer differs from the right one, if it does.
     pub(crate) fn mismatch(self, right: Self) -> Option<String> {
         (self != right).then(|| {
             format!(

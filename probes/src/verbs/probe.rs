@@ -2,19 +2,17 @@
 
 use crate::algorithms::Algorithms;
 use crate::args::Probe;
-use crate::contention::contend;
 use crate::destination::Destination;
 use crate::exit::Outcome;
 use crate::flaw::flaw;
 use crate::hardware::{self, measure_hardware};
 use crate::sweep::{Conditions, Found, sweep_all};
 use crate::terminal::Terminal;
-use crate::{child, interrupt, node, output, profiles, provenance, restriction, summary};
+use crate::{child, interrupt, node, output, profiles, provenance, summary};
 use anyhow::Context;
 use sapwise::{Hardware, measure, usable_cores};
 use sapwise_lab::data::read_report;
-use sapwise_lab::report;
-use sapwise_lab::report::{Report, Restriction};
+use sapwise_lab::report::{self, Report};
 use sapwise_lab::sweep::Plan;
 use std::path::Path;
 use std::time::Instant;
@@ -25,7 +23,6 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
     }
     let began = Instant::now();
     let plan = plan(arguments)?;
-    let references = restriction::references(&arguments.unrestricted)?;
     let in_folder = arguments.out.as_deref().filter(|out| out.is_dir()).map(node::report_in);
     if let Some(path) = in_folder.as_deref().filter(|path| path.exists())
         && let Some(there) = good(path, arguments, algorithms)?
@@ -46,14 +43,10 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
     if arguments.leashed {
         child::stop_with_parent();
     }
-    let contention = arguments.contended.map(|kind| contend(kind, arguments.threads)).transpose();
-    let contention = contention.context("the threads for --contended can't be started")?;
     let (hardware, measured) = measure_hardware(arguments.threads, &arguments.gpus)?;
     let told = summary::gpus_left_out(&arguments.gpus, &hardware, &measured.left_out, &measured.remarks);
-    let restriction = restriction::restriction(arguments.threads, arguments.contended, &hardware, &references);
-    let mut before = [measured.remarks, hardware.disturbed()].concat();
-    before.extend(restriction.iter().flat_map(restriction::not_shown));
-    let assemble = |found| assemble(arguments, algorithms, &hardware, restriction.clone(), found, began);
+    let before = [measured.remarks, hardware.disturbed()].concat();
+    let assemble = |found| assemble(arguments, algorithms, &hardware, found, began);
     let mut found = Found { remarks: before.clone(), ..Found::default() };
     if interrupt::requested() {
         found.remarks.push("interrupted during the hardware parameters; the rest is missing".to_owned());
@@ -62,7 +55,6 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
         let conditions = Conditions {
             cores: arguments.threads.unwrap_or_else(usable_cores),
             seed: arguments.seed,
-            contended: arguments.contended.is_some(),
             gpus: measured.usable,
         };
         found = sweep_all(plan, &conditions, &mut |so_far| {
@@ -76,7 +68,6 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
         })?;
         found.remarks.splice(0..0, before.iter().cloned());
     }
-    drop(contention);
     let (failed, interrupted) = (found.failed, found.interrupted);
     let report = assemble(found);
     let saved = destination.as_ref().map(|d| if interrupted { d.save_interrupted(&report) } else { d.save(&report) });
@@ -134,17 +125,10 @@ fn plan(arguments: &Probe) -> anyhow::Result<Option<Plan>> {
     Ok((!arguments.hardware_only).then(|| Plan::new(arguments.quick, &scenarios, arguments.max_objects)))
 }
 
-fn assemble(
-    arguments: &Probe,
-    algorithms: &Algorithms,
-    hardware: &Hardware,
-    restriction: Option<Restriction>,
-    found: Found,
-    began: Instant,
-) -> Report {
+fn assemble(arguments: &Probe, algorithms: &Algorithms, hardware: &Hardware, found: Found, began: Instant) -> Report {
     Report {
         label: provenance::label(arguments, &found.points, hardware),
-        provenance: provenance::provenance(arguments, restriction, hardware, began.elapsed()),
+        provenance: provenance::provenance(arguments, hardware, began.elapsed()),
         hardware: hardware.clone(),
         algorithms: provenance::timed(&found.points, arguments.threads, hardware, algorithms),
         points: found.points,

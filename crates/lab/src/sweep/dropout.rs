@@ -1,33 +1,33 @@
-//! Which algorithms leave the race before the largest size.
+//! Which algorithms leave a sweep before the largest size.
 
-/// An algorithm leaves when it takes more than this many times as long as the best.
+/// An algorithm that takes this many times as long as the best is hopeless. It leaves when it falls behind as well.
 const HOPELESS: f64 = 8.0;
 
-/// It has fallen behind where that ratio is so many times what it was at the size before: of one that keeps its distance noise says that at every other size.
-/// On an H200 `grid-sap` left `mixed` at 1000 objects, at 18 times the best as at the size before, and it was never seen what it takes of more.
+/// Growth of that ratio since the previous size from which on an algorithm falls behind: smaller growth is noise. On
+/// an H200 noise made `grid-sap` leave `mixed` at 1000 objects, at 18 × the best there and at the previous size.
 const FALLS_BEHIND: f64 = 1.1;
 
-/// An algorithm leaves at this ratio where the next size would not fit into the time with it: the crossover between the fast ones
-/// is worth more than one more point of a slow one.
+/// Ratio at which an algorithm leaves when time is short: a crossover between fast algorithms is worth more than
+/// another point of a slow one.
 const SLOW: f64 = 3.0;
 
-/// Nobody leaves below this size: a frame costs microseconds there, and a ratio of two such times jumps from size to size.
+/// Nobody leaves below this size: a frame takes microseconds there, and ratios jump from size to size.
 const JUDGED_FROM: u32 = 1000;
 
-/// The paper's method stays up to this size even when it is hopeless: its curve is what the paper's crossovers are made of.
+/// `brute` stays up to this size even when it is hopeless: the paper's crossovers need its curve.
 const BRUTE_STAYS_BELOW: u32 = 3000;
 
 /// The race of one algorithm through the sizes of a scenario.
 #[derive(Debug, Clone, Default)]
 pub struct Standing {
-    /// Its time over the best at the size before.
+    /// Its time over the best at the previous size.
     before: Option<f64>,
     /// Whether it has left.
     pub out: bool,
 }
 
 impl Standing {
-    /// Takes the algorithm out where time is short, if it took several times as long as the best. Returns its ratio then.
+    /// Takes a slow algorithm out because time is short, and returns its time over the best.
     pub fn leave_if_slow(&mut self) -> Option<f64> {
         let slow = self.before.filter(|&ratio| ratio > SLOW);
         self.out |= slow.is_some();
@@ -36,7 +36,7 @@ impl Standing {
 
     /// Judges the algorithm after a size at which it took `ratio` times as long as the best.
     ///
-    /// What is slow but gains on the others stays: parallel versions start far behind and win in the end.
+    /// A slow one that gains on the others stays: parallel versions start far behind and win in the end.
     pub fn judge(&mut self, ratio: f64, method: &str, objects: u32) {
         let falls_behind = self.before.is_some_and(|before| ratio > FALLS_BEHIND * before);
         let kept = method == "brute" && objects < BRUTE_STAYS_BELOW;

@@ -1,12 +1,10 @@
-//! The loads of a scenario over sizes, with the pairs that it really has.
+//! The loads of a scenario over sizes, with the real number of pairs.
 
 use anyhow::Context;
 use sapwise::{Displacement, Load, Pairs, Registry};
 use sapwise_scenes::{Scenario, Scene};
 
-/// Advances to the next frame that has as many objects as the size says.
-///
-/// Only in `fragmentation` the number changes, and samples of different sizes can't be put together.
+/// Advances to the next frame with all objects. Only `fragmentation` has others.
 pub fn next_frame(scene: &mut Scene) {
     for _ in 0..Scenario::FRAGMENTATION_FRAMES {
         scene.advance();
@@ -16,11 +14,11 @@ pub fn next_frame(scene: &mut Scene) {
     }
 }
 
-/// The load of a scenario's second frame at each of `sizes`, in numbers of objects. `done` is called with each load as it is known, and ends
-/// the work by an error.
+/// Returns the load of a scenario's second frame at each of `sizes`, in numbers of objects. Calls `done` with each
+/// one; an error of it ends the work.
 ///
 /// # Errors
-/// When the pairs can't be found for want of memory, and those of `done`.
+/// When memory for the pairs is lacking, and those of `done`.
 pub fn loads(
     scenario: Scenario,
     sizes: &[u32],

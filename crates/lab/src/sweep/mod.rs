@@ -1,4 +1,4 @@
-//! What a sweep is: which scenarios and sizes, under which loads, and which algorithms drop out.
+//! The rules of a sweep: scenarios, sizes, loads, and which algorithms drop out.
 
 mod dropout;
 mod loads;
@@ -8,11 +8,12 @@ pub use dropout::Standing;
 pub use loads::{loads, next_frame};
 pub use plan::{Ascent, Plan, share};
 
-/// Frames before the samples of an incremental algorithm: how far boxes move is known in the second, and the shares of them that leave their
-/// grown boxes follow over some tens. Fewer would time the cheap frames after a rebuild: at 3162 objects 11 us where the others take 34.
+/// Warm-up frames of an incremental algorithm: its motion estimate needs two frames, and the share of boxes that
+/// leave their fat AABBs needs dozens. Fewer frames would time the cheap frames after a rebuild: 11 instead of 34 µs
+/// at 3162 objects.
 pub const WARM_UP: usize = 24;
 
-/// The median of samples in nanoseconds. `None` without samples.
+/// Returns the median of samples in nanoseconds; `None` without samples.
 #[must_use]
 pub fn median(samples: &[u64]) -> Option<f64> {
     let samples: Vec<f64> = samples.iter().map(|&ns| ns as f64).collect();

@@ -1,20 +1,20 @@
-//! What a sweep measures and how long it may take.
+//! Scenarios, sizes and time of a sweep.
 
 use sapwise_scenes::Scenario;
 use std::time::Duration;
 
 /// Scenarios, sizes and time of a sweep.
 ///
-/// It begins with the ascents, one for each scenario: every algorithm through all sizes, for the shape of the cost curves. Rounds of
-/// visits follow, to where the choice is in doubt after what was measured before.
+/// One ascent for each scenario runs every algorithm through all sizes, for the shape of the cost curves. Rounds of
+/// visits to sizes where the best algorithms are close follow.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// In the order of measurement.
     pub ascents: Vec<Ascent>,
-    /// Rounds of visits. Several, minutes apart: what the host does in the meantime differs, and medians over all of them are
-    /// worth more than as many samples at once.
+    /// Rounds of visits, minutes apart: what the host does differs between them, so that medians over several rounds
+    /// are worth more than as many samples at once.
     pub rounds: u32,
-    /// Time for everything. What the ascents leave is for the visits.
+    /// Time for everything. The visits get what the ascents leave.
     pub total: Duration,
 }
 
@@ -25,16 +25,16 @@ pub struct Ascent {
     pub scenario: Scenario,
     /// Numbers of objects, ascending.
     pub sizes: Vec<u32>,
-    /// Time for all of them. A slower machine gets fewer sizes in that time, not more time.
+    /// Time for all sizes. A slower machine reaches fewer sizes in that time.
     pub time: Duration,
 }
 
-/// Spread over the densities that shift the crossovers most: even, in blobs, and with sizes over two decades.
+/// The densities that shift the crossovers most: even, in blobs, and with box sizes over two decades.
 const QUICK: [Scenario; 3] = [Scenario::Uniform, Scenario::Clustered, Scenario::Mixed];
 const QUICK_OBJECTS: u32 = 300_000;
 const QUICK_PER_DECADE: u32 = 3;
 const QUICK_ROUNDS: u32 = 1;
-/// Of the 30 s that a quick probe may take, some are for the hardware; the rest is for starting and writing.
+/// A quick probe may take 30 s. The hardware, starting and writing take the rest.
 const QUICK_TOTAL: Duration = Duration::from_secs(21);
 
 const FULL: [Scenario; 7] = [
@@ -46,26 +46,26 @@ const FULL: [Scenario; 7] = [
     Scenario::Gravity,
     Scenario::Fragmentation,
 ];
-/// In the hard scenarios it counts how bad a method gets, not where exactly one overtakes another. So a full sweep takes them at one size a
-/// decade, in a quarter of the time each.
+/// Hard scenarios show how slow a method gets, not where one overtakes another: one size a decade and a quarter of
+/// the time.
 const HARD_PER_DECADE: u32 = 1;
 const HARD_SHARE: f64 = 0.25;
-/// Below this size no scene is hard.
+/// Smaller scenes are not hard.
 const HARD_FROM: u32 = 1000;
 const FULL_OBJECTS: u32 = 1_000_000;
 const FULL_PER_DECADE: u32 = 4;
 const FULL_ROUNDS: u32 = 3;
-/// Of the 3 minutes that a probe may take.
+/// A probe may take three minutes.
 const FULL_TOTAL: Duration = Duration::from_secs(160);
 
 /// Share of the time for the ascents.
 const ASCENT_SHARE: f64 = 0.6;
 
 impl Plan {
-    /// The usual plan, with the user's scenarios and largest size where there are any.
+    /// Returns the usual plan, or that of the user's scenarios and largest size.
     ///
-    /// A quick plan has none of the hard scenarios, and a full one has them at fewer sizes. A scenario that the user names is measured as
-    /// thoroughly as any.
+    /// A quick plan has no hard scenarios, a full one has them at fewer sizes. Scenarios that the user names are
+    /// measured in full.
     pub fn new(quick: bool, scenarios: &[Scenario], max_objects: Option<u32>) -> Self {
         let (usual, usual_hard, objects, per_decade, rounds, total) = if quick {
             (&QUICK[..], &[][..], QUICK_OBJECTS, QUICK_PER_DECADE, QUICK_ROUNDS, QUICK_TOTAL)
@@ -75,7 +75,7 @@ impl Plan {
         let (even, hard) = if scenarios.is_empty() { (usual, usual_hard) } else { (scenarios, &[][..]) };
         let max = max_objects.unwrap_or(objects);
         let shares = |even: &[Scenario], hard: &[Scenario]| even.len() as f64 + hard.len() as f64 * HARD_SHARE;
-        // More scenarios than usual share the time; fewer don't get more than usual each.
+        // More scenarios than usual share the time; fewer get no more than usual each.
         let total = total.min(total.mul_f64(shares(even, hard) / shares(usual, usual_hard)));
         let time = total.mul_f64(ASCENT_SHARE / shares(even, hard));
         let ascent = |&scenario: &Scenario| Ascent { scenario, sizes: sizes(max, per_decade), time };
@@ -87,19 +87,18 @@ impl Plan {
     }
 }
 
-/// Sizes from 10 up, `per_decade` of them to a decade, and `max` as the last.
+/// Returns sizes from 10 to `max`, `per_decade` of them in a decade.
 fn sizes(max: u32, per_decade: u32) -> Vec<u32> {
     let each = f64::from(per_decade);
     let grid = (per_decade..).map(|k| 10.0_f64.powf(f64::from(k) / each).round() as u32);
-    // A size just below the last would cost as much as the last and tell nothing new.
+    // A size just below the last takes as long as the last and adds nothing.
     let mut sizes: Vec<u32> = grid.take_while(|&n| f64::from(n) * 1.2 < f64::from(max)).collect();
     sizes.push(max);
     sizes
 }
 
-/// Share of the time left that the first of these sizes gets.
-///
-/// Time for a point grows with the cube root of the size: small ones need it to tell foreign load, large ones for frames.
+/// Returns the share of the remaining time for the first of these sizes. It grows with the cube root of the size:
+/// small sizes need time to measure foreign load, large ones for frames.
 pub fn share(sizes_left: &[u32]) -> f64 {
     let weight = |n: &u32| f64::from(*n).cbrt();
     let all: f64 = sizes_left.iter().map(weight).sum();

@@ -1,60 +1,60 @@
-//! What may be wrong with a file of boxes.
+//! Errors of files of boxes.
 
 use std::collections::TryReserveError;
 use std::io;
 use std::path::PathBuf;
 
-/// Boxes can't be read from a file; its source says why.
+/// Boxes can't be read from a file; the source says why.
 #[derive(Debug, thiserror::Error)]
 #[error("can't read boxes from {}", path.display())]
 #[non_exhaustive]
 pub struct FramesError {
-    /// The file that was asked for.
+    /// The file.
     pub path: PathBuf,
-    /// What is wrong with it.
+    /// The reason.
     pub source: NpyError,
 }
 
-/// What is wrong with a `.npy` file that is to hold boxes.
+/// The reason why a `.npy` file holds no boxes.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum NpyError {
-    /// The system can't open or read it.
+    /// The system can't open or read the file.
     #[error(transparent)]
     Io(#[from] io::Error),
-    /// A pipe or a device has no size, and some never end.
+    /// A pipe or a device, which has no size and may never end.
     #[error("it is no regular file")]
     NotAFile,
-    /// It holds no byte.
+    /// The file is empty.
     #[error("the file is empty")]
     Empty,
     /// Another format.
     #[error("it is no .npy file: the first bytes aren't \\x93NUMPY")]
     NotNpy,
-    /// It is cut before its data begin.
+    /// The file ends before its data begin.
     #[error("the file ends within its header")]
     CutHeader,
-    /// A version of the format that is not known here.
+    /// An unknown version of the format.
     #[error("version {0} of the .npy format is unknown")]
     Version(u8),
-    /// The dictionary of the header can't be read, for this reason.
+    /// The dictionary of the header can't be read.
     #[error("the header is malformed: {0}")]
     Header(String),
-    /// Elements of another type than little-endian float32.
+    /// The elements are not little-endian float32.
     #[error("its elements are {}; save it with .astype('<f4')", elements(.0))]
     Elements(String),
-    /// Neither one frame of boxes nor several.
+    /// The shape is neither one frame of boxes nor several.
     #[error("its shape is {0:?}, where [n, 6] or [frames, n, 6] is needed")]
     Shape(Vec<u64>),
-    /// More frames, boxes or bytes than there can be.
+    /// The shape claims more frames, boxes or bytes than there can be.
     #[error("its header claims a shape of {shape:?}, more than {limit}")]
     TooLarge {
         /// The length of each axis.
         shape: Vec<u64>,
-        /// What it exceeds, in words.
+        /// The limit, in words.
         limit: &'static str,
     },
-    /// Too many frames that hold nothing.
+    /// Too many empty frames.
     #[error("its header claims {0} frames without a box")]
     EmptyFrames(u64),
     /// Fewer bytes of data than the header claims.
@@ -73,17 +73,17 @@ pub enum NpyError {
         /// Bytes that the shape takes.
         bytes: u64,
     },
-    /// An absent box before one that is there.
+    /// An absent box precedes a present one.
     #[error("frame {frame}: row {row} is NaN, and row {last} is not; absent boxes stand at the end of a frame")]
     AbsentInside {
-        /// The first frame that has such a row.
+        /// The first frame with such a row.
         frame: usize,
-        /// The row that is NaN throughout.
+        /// The row of NaN.
         row: usize,
-        /// The last row of that frame that holds a box.
+        /// The last row of the frame that holds a box.
         last: usize,
     },
-    /// It is shorter than it was a moment ago.
+    /// The file became shorter while it was read.
     #[error("it changed while it was read")]
     Changed,
     /// The boxes don't fit into memory.
@@ -98,13 +98,13 @@ fn elements(descr: &str) -> String {
     }
 }
 
-/// A frame holds a box that no algorithm can order.
+/// A frame holds a box that every algorithm refuses.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("frame {frame}: {error}; only rows at the end of a frame may be NaN throughout, which are absent boxes")]
 #[non_exhaustive]
 pub struct InvalidFrame {
     /// Position of the first such frame.
     pub frame: usize,
-    /// Names the first such box in it.
+    /// The first such box.
     pub error: sapwise::Error,
 }

@@ -1,7 +1,8 @@
 //! The header of a `.npy` file.
 //!
-//! Format: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>. Parsed here and not by ndarray-npy 0.9,
-//! which panics on a shape such as `(0, 2**40, 2**40)` and runs out of stack on a header of ten thousand brackets.
+//! Format: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>. Parsed here and not by
+//! ndarray-npy 0.9, which panics on a shape such as `(0, 2**40, 2**40)` and runs out of stack on a header of ten
+//! thousand brackets.
 
 use std::io::{self, Read, Write};
 
@@ -10,19 +11,19 @@ use super::error::NpyError;
 /// The first bytes of every file.
 const MAGIC: &[u8] = b"\x93NUMPY";
 
-/// What a header says of the data that follow it.
+/// The description of the data that follow.
 #[derive(Debug, PartialEq)]
 pub(super) struct Header {
-    /// Type of the elements as numpy writes it, such as `<f4`.
+    /// Type of the elements in numpy's notation, such as `<f4`.
     pub(super) descr: String,
-    /// Whether the first index runs fastest.
+    /// Whether the first index varies fastest.
     pub(super) fortran_order: bool,
     /// Length of each axis, as claimed.
     pub(super) shape: Vec<u64>,
 }
 
 impl Header {
-    /// Reads the header at the beginning of a file, and nothing after it.
+    /// Reads the header at the start of a file and nothing after it.
     pub(super) fn read(file: &mut impl Read) -> Result<Self, NpyError> {
         let mut magic = Vec::new();
         file.take(6).read_to_end(&mut magic)?;
@@ -43,7 +44,8 @@ impl Header {
         Self::parse(text).map_err(NpyError::Header)
     }
 
-    /// Writes the header of a file whose data begin at a multiple of 64 bytes, as numpy does. The shape has two axes or more.
+    /// Writes the header of a file whose data begin at a multiple of 64 bytes, as numpy does. The shape has two axes
+    /// or more.
     pub(super) fn write(&self, out: &mut impl Write) -> io::Result<()> {
         let axes: Vec<String> = self.shape.iter().map(u64::to_string).collect();
         let order = if self.fortran_order { "True" } else { "False" };
@@ -115,13 +117,13 @@ fn bytes<const N: usize>(file: &mut impl Read) -> Result<[u8; N], NpyError> {
     Ok(bytes)
 }
 
-/// The text after the mark that it must begin with, blanks left out.
+/// Returns the text after the mark that it must begin with, without blanks.
 fn after(text: &str, mark: char) -> Result<&str, String> {
     let rest = text.trim_start().strip_prefix(mark).ok_or_else(|| format!("no {mark} where one is due"))?;
     Ok(rest.trim_start())
 }
 
-/// The quoted text that `text` must begin with, and what follows it.
+/// Returns the quoted text that `text` must begin with, and the rest.
 fn quoted(text: &str) -> Result<(&str, &str), String> {
     let quote = text.chars().next().filter(|c| matches!(c, '\'' | '"')).ok_or("no quoted text where one is due")?;
     let (inside, rest) = text[1..].split_once(quote).ok_or("a quotation mark is missing")?;

@@ -1,4 +1,4 @@
-//! Reads a stream of frames.
+//! Reading a stream of frames.
 
 use std::fs::{self, File};
 use std::io::{self, BufReader, Read};
@@ -9,19 +9,18 @@ use super::header::Header;
 use super::{BOUNDS, Frames};
 use sapwise::Aabb;
 
-/// Frames without a box take no room in a file, but time and an entry of the answer each.
+/// Limit on empty frames: they take no room in a file, but each takes time and memory.
 const MOST_EMPTY_FRAMES: u64 = 1_000_000;
 
 impl Frames {
-    /// Reads a `.npy` file of little-endian float32, of shape `n x 6` (one frame) or `frames x n x 6`, in C or Fortran order: lowest x, y
-    /// and z of a box, then highest x, y and z.
+    /// Reads a `.npy` file of little-endian float32 of shape `n x 6` (one frame) or `frames x n x 6`, in C or Fortran
+    /// order. A row is a box: lowest x, y and z, then highest x, y and z.
     ///
-    /// In the second shape, rows of NaN at the end of a frame are absent boxes. The boxes themselves aren't checked here: the algorithms
-    /// refuse NaN and inverted ones, and [`Frames::check`] does.
+    /// In the second shape, rows of NaN at the end of a frame are absent boxes. [`Frames::check`] looks at the boxes
+    /// themselves.
     ///
     /// # Errors
-    /// Names the file, and what is wrong with it. Memory is taken for what the file holds, never for what its header claims, and the
-    /// file is not held beside its boxes.
+    /// Names the file and its defect. Allocates for what the file holds, never for what its header claims.
     pub fn read(path: &Path) -> Result<Self, FramesError> {
         let frames = || {
             let found = fs::metadata(path)?;
@@ -33,7 +32,7 @@ impl Frames {
         frames().map_err(|source| FramesError { path: path.to_owned(), source })
     }
 
-    /// Reads the same from anything that holds `length` bytes.
+    /// Reads the same from any source of `length` bytes.
     ///
     /// # Errors
     /// What is wrong with it.
@@ -53,7 +52,7 @@ impl Frames {
             _ => return Err(NpyError::Shape(shape)),
         };
         let single = shape.len() == 2;
-        // An axis beside one of length 0 takes no room in a file, so that only this bounds it.
+        // Beside an axis of length 0 the size of the file limits nothing.
         let numbered = |count: u64| u32::try_from(count).ok().map(|count| count as usize);
         let (Some(frames), Some(objects)) = (numbered(frames), numbered(objects)) else {
             return Err(NpyError::TooLarge { shape, limit: "can be numbered" });
@@ -74,7 +73,7 @@ impl Frames {
         }
         let boxes =
             if fortran_order { in_fortran_order(&mut file, frames, objects)? } else { in_c_order(&mut file, count)? };
-        // One frame has no other that could have more boxes, so that a row of NaN in it is a mistake.
+        // Only a stream of several frames needs absent boxes: in one frame a row of NaN is a mistake.
         if single {
             return Ok(Frames { ends: vec![boxes.len()], boxes });
         }
@@ -82,7 +81,7 @@ impl Frames {
     }
 }
 
-/// A reader that knows how far it has come.
+/// A reader that counts its bytes.
 struct Counted<'a, R> {
     file: &'a mut R,
     bytes: u64,
@@ -137,7 +136,7 @@ fn element(file: &mut impl Read) -> Result<f32, NpyError> {
     Ok(f32::from_le_bytes(bytes))
 }
 
-/// Frames of `objects` rows each, without the absent boxes.
+/// Returns frames of `objects` rows each without the absent boxes.
 fn without_absent(mut boxes: Vec<Aabb>, frames: usize, objects: usize) -> Result<Frames, NpyError> {
     let absent = |b: &Aabb| b.min.iter().chain(&b.max).all(|x| x.is_nan());
     let mut ends = Vec::with_capacity(frames);

@@ -1,4 +1,4 @@
-//! Writes frames and pairs.
+//! Writing frames and pairs.
 
 use std::io::{self, Write};
 
@@ -6,8 +6,7 @@ use super::BOUNDS;
 use super::header::Header;
 use sapwise::{Aabb, Pair};
 
-/// Writes a stream of frames that [`Frames::read`](super::Frames::read) reads, one frame after the other. Only one of them need be in
-/// memory at a time.
+/// Writes a stream of frames for [`Frames::read`](super::Frames::read), one frame at a time.
 ///
 /// ```
 /// use sapwise_scenes::{FrameWriter, Scenario};
@@ -25,13 +24,13 @@ use sapwise::{Aabb, Pair};
 #[derive(Debug)]
 pub struct FrameWriter<W> {
     out: W,
-    /// Frames that are still to come.
+    /// Frames still to come.
     frames: usize,
     objects: usize,
 }
 
 impl<W: Write> FrameWriter<W> {
-    /// Begins a stream of `frames` frames of up to `objects` boxes each: these must be known before the first is written.
+    /// Starts a stream of `frames` frames of up to `objects` boxes each.
     ///
     /// # Errors
     /// Those of the writer.
@@ -41,7 +40,7 @@ impl<W: Write> FrameWriter<W> {
         Ok(Self { out, frames, objects })
     }
 
-    /// Writes the next frame, filled up with absent boxes.
+    /// Writes the next frame and fills it up with absent boxes.
     ///
     /// # Errors
     /// Those of the writer; [`io::ErrorKind::InvalidInput`] for more frames or more boxes than were announced.

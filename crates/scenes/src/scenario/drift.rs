@@ -12,7 +12,7 @@ const HALF: f32 = 0.5;
 pub(super) struct Clusters {
     /// The middles of the blobs; object `i` belongs to blob `i` modulo their number.
     homes: Vec<[f32; 3]>,
-    /// Where each object is, seen from the middle of its blob.
+    /// The place of each object relative to the middle of its blob.
     offsets: Vec<[f32; 3]>,
     step: f32,
     /// Share of its offset by which an object is pulled back in a frame, which holds the blobs at their width.
@@ -28,7 +28,8 @@ impl Clusters {
         let sigma = 3.0 * cube_root(objects.max(1) as f64 / (1000 * blobs) as f64) as f32;
         let homes = (0..blobs).map(|_| rng.signed3().map(|u| u * wall)).collect();
         let offsets = (0..objects).map(|_| rng.gauss3().map(|g| g * sigma)).collect();
-        // A walk with steps of variance v, pulled back by p, settles at variance v / (2 p); a uniform step has v = step^2 / 3.
+        // A walk with steps of variance v, pulled back by p, settles at variance v / (2 p); a uniform step has v =
+        // step^2 / 3.
         Self { homes, offsets, step, pull: step * step / (6.0 * sigma * sigma) }
     }
 
@@ -56,7 +57,7 @@ fn around(home: &[f32; 3], offset: &[f32; 3]) -> Aabb {
     Aabb::cube([home[0] + offset[0], home[1] + offset[1], home[2] + offset[2]], HALF)
 }
 
-/// Unit cubes in the world of `uniform` that fly straight on, and now and then in a new direction.
+/// Unit cubes in the world of `uniform` that fly straight on and now and then turn.
 #[derive(Debug, Clone)]
 pub(super) struct Brownian {
     centres: Vec<[f32; 3]>,
@@ -110,8 +111,8 @@ impl Brownian {
 
 /// Unit cubes that swirl about a point which moves.
 ///
-/// Each is drawn to the point by a force that grows with the distance, slowed a little, and pushed at random by as much as
-/// that takes away (a Langevin equation), so that the swarm neither collapses nor scatters.
+/// Each is drawn to the point by a force that grows with the distance, slowed a little, and pushed at random by as
+/// much as that takes away (a Langevin equation), so that the swarm neither collapses nor scatters.
 #[derive(Debug, Clone)]
 pub(super) struct Gravity {
     centres: Vec<[f32; 3]>,
@@ -148,7 +149,8 @@ impl Gravity {
             wall: 3.0 * sigma,
             pull: turn * turn,
             keep,
-            // A uniform push of up to p has variance p^2 / 3; keeping k of the velocity loses 1 - k^2 of its variance.
+            // A uniform push of up to p has variance p^2 / 3; keeping k of the velocity loses 1 - k^2 of its
+            // variance.
             push: Self::SPEED * (3.0 * (1.0 - keep * keep)).sqrt(),
         }
     }

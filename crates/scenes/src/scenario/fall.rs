@@ -37,7 +37,8 @@ impl Fall {
         let count = objects as u64;
         let layers = (cube_root(objects as f64).ceil() as u64).clamp(1, LAYERS);
         let side = (count.div_ceil(layers) as f64).sqrt().ceil() as u64;
-        // Objects that follow each other in the list lie far apart in the pile: a step of the golden section, made coprime.
+        // Objects that follow each other in the list lie far apart in the pile: a step of the golden section, made
+        // coprime.
         let mut stride = (objects as f64 * 0.618_033_988_749_895) as u64;
         while gcd(stride, count) > 1 {
             stride += 1;

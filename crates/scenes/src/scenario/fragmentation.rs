@@ -1,7 +1,8 @@
 //! Cubes that shatter and are cleared away, so that their number runs from ten to the peak and back: `fragmentation`.
 //!
-//! After Figure 1 of Avril, Gouranton and Arnaldi, "Dynamic Adaptation of Broad Phase Collision Detection Algorithms",
-//! ISVRI 2011: few cubes, which a user splits or deletes at will, so that the number of objects runs from few to thousands.
+//! After Figure 1 of Avril, Gouranton and Arnaldi, "Dynamic Adaptation of Broad Phase Collision Detection
+//! Algorithms", ISVRI 2011: few cubes, which a user splits or deletes at will, so that the number of objects runs
+//! from few to thousands.
 
 use super::Scenario;
 use super::rng::{Powers, Rng, cube_root};
@@ -11,7 +12,8 @@ use sapwise::Aabb;
 /// Cubes at the beginning of a cycle, or the peak where that is lower.
 const START: usize = 10;
 
-/// The number of objects through a cycle: a frame, and the logarithm of the number as a share of the way from start to peak.
+/// The number of objects through a cycle: a frame, and the logarithm of the number as a share of the way from start
+/// to peak.
 ///
 /// Between two entries the share is a straight line. Entries in consecutive frames are bursts and mass deletions.
 const COURSE: [(u64, f32); 27] = [
@@ -44,7 +46,8 @@ const COURSE: [(u64, f32); 27] = [
     (Scenario::FRAGMENTATION_FRAMES, 0.0),
 ];
 
-/// Volume of the world over the sum of the cubes' volumes. Pieces at random places have 4 / 2.5 pairs each, less at the walls.
+/// Volume of the world over the sum of the cubes' volumes. Pieces at random places have 4 / 2.5 pairs each, less at
+/// the walls.
 const VOLUME: f64 = 2.5;
 /// Gap between the pieces of one cube as they fly apart, as a share of their edge.
 const GAP: f32 = 0.1;
@@ -64,7 +67,7 @@ pub(super) struct Fragmentation {
     wall: f32,
     start: usize,
     peak: usize,
-    /// Peak over start, to any power.
+    /// Powers of peak over start.
     growth: Powers,
     /// The cube that is split or grown next. It goes round, so that sizes stay alike.
     cursor: usize,
@@ -89,7 +92,8 @@ impl Fragmentation {
         }
     }
 
-    /// Moves all cubes, or begins a cycle; splits or merges them until there are as many as `frame` asks for; writes the boxes.
+    /// Moves all cubes, or begins a cycle; splits or merges them until there are as many as `frame` asks for; writes
+    /// the boxes.
     pub(super) fn advance(&mut self, frame: u64, rng: &mut Rng, boxes: &mut Vec<Aabb>) {
         let frame = frame % Scenario::FRAGMENTATION_FRAMES;
         if frame == 0 {

@@ -1,7 +1,7 @@
-//! Random numbers and the two functions that scenes need beyond `+ - * /` and the square root.
+//! Random numbers, cube roots and powers from `+ - * /` and the square root alone.
 //!
-//! A scene must have the same bits on every platform. IEEE 754 fixes the results of those five operations, and not those of
-//! `cbrt`, `powf` or `ln`, which differ between C libraries; so they are built from the five here.
+//! A scene must have the same bits on every platform. IEEE 754 fixes the results of those five operations, and not
+//! those of `cbrt`, `powf` or `ln`, which differ between C libraries; so they are built from the five here.
 
 use crate::random::Random;
 
@@ -13,13 +13,14 @@ pub(super) struct Rng([u64; 4]);
 const UNIT_21: f32 = 1.0 / 1_048_576.0;
 
 impl Rng {
-    /// A generator whose state is filled by splitmix64, which is what [`Random`] is, as the authors of xoshiro advise.
+    /// A generator whose state is filled by splitmix64, which is what [`Random`] is, as the authors of xoshiro
+    /// advise.
     pub(super) fn new(seed: u64) -> Self {
         let mut random = Random::new(seed);
         Self([(); 4].map(|()| random.bits()))
     }
 
-    /// 64 random bits.
+    /// Returns 64 random bits.
     #[inline]
     pub(super) fn bits(&mut self) -> u64 {
         let s = &mut self.0;
@@ -46,7 +47,7 @@ impl Rng {
         (self.bits() >> 40) as f32 * (1.0 / 16_777_216.0)
     }
 
-    /// A whole number from 0 up to, not including, `end`, which is far below 2^64: then every number is as likely to parts in a billion.
+    /// A whole number from 0 (included) to `end` (excluded), uniform to parts in a billion: `end` is far below 2^64.
     #[inline]
     pub(super) fn below(&mut self, end: usize) -> usize {
         (self.bits() % end as u64) as usize
@@ -78,8 +79,8 @@ pub(super) fn cube_root(x: f64) -> f64 {
     if x <= 0.0 {
         return 0.0;
     }
-    // A third of the exponent, with the constant of FreeBSD's `cbrt`, is within 4 % of the root; four iterations square
-    // that error down to rounding.
+    // A third of the exponent, with the constant of FreeBSD's `cbrt`, is within 4 % of the root; four iterations
+    // square that error down to rounding.
     let mut y = f64::from_bits(x.to_bits() / 3 + 0x2A9F_7893_0000_0000);
     for _ in 0..4 {
         y -= (y * y * y - x) / (3.0 * y * y);
@@ -87,7 +88,8 @@ pub(super) fn cube_root(x: f64) -> f64 {
     y
 }
 
-/// Powers of one base with exponents from 0 to 1: products of its repeated square roots, one for each bit of the exponent.
+/// Powers of one base with exponents from 0 to 1: products of its repeated square roots, one for each bit of the
+/// exponent.
 #[derive(Debug, Clone)]
 pub(super) struct Powers {
     roots: [f64; 24],
@@ -111,7 +113,8 @@ impl Powers {
         if bits >= 1 << 24 {
             return self.base;
         }
-        // Chosen by arithmetic rather than by a branch, which random bits would mispredict; a factor of one changes nothing.
+        // Chosen by arithmetic rather than by a branch, which random bits would mispredict; a factor of one changes
+        // nothing.
         let factor = |(i, &root): (usize, &f64)| if bits >> (23 - i) & 1 == 1 { root } else { 1.0 };
         self.roots.iter().enumerate().map(factor).product()
     }

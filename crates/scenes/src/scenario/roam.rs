@@ -1,4 +1,4 @@
-//! Objects that walk about homes: the scenes that are few pairs and hard all the same.
+//! Objects that walk about their homes: the hard scenes with few pairs.
 //!
 //! `parked`, `stations`, `layers`, `plates`, `rods`, `static-world`, `asleep`, `tower`, `aliased`, `teleport`.
 
@@ -13,21 +13,21 @@ const JUMP_FRAMES: u64 = 30;
 /// Half the edge of a cube.
 const HALF: f32 = 0.5;
 
-/// Objects of a few kinds, each of which walks about a home of its own between walls that reflect its centre.
+/// Objects of a few kinds. Each walks about its own home between walls that reflect its centre.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Roam {
     kinds: Vec<Kind>,
     /// The kind of each object, by its place in `kinds`.
     kind_of: Vec<u8>,
-    /// The place about which each object walks.
+    /// The home of each object.
     homes: Vec<[f32; 3]>,
-    /// Where each object is, seen from its home.
+    /// The place of each object relative to its home.
     offsets: Vec<[f32; 3]>,
-    /// Whether all objects jump now and then.
+    /// Whether all objects jump every [`JUMP_FRAMES`].
     jumps: bool,
 }
 
-/// What objects of one shape and freedom have in common.
+/// The shape and the motion of objects.
 #[derive(Debug, Clone, Copy)]
 struct Kind {
     /// Half the extent on each axis.
@@ -39,7 +39,7 @@ struct Kind {
 }
 
 impl Kind {
-    /// Unit cubes that walk as those of `uniform` do, up to `walls` from their home.
+    /// Unit cubes that walk like those of `uniform`, up to `walls` from their home.
     fn cubes(walls: [f32; 3]) -> Self {
         Self { half: [HALF; 3], walls, step: STEP }
     }
@@ -55,7 +55,7 @@ fn wall(objects: usize) -> f32 {
     cube_root(5.0 * objects as f64) as f32
 }
 
-/// One object of every run of some, at a random place in its run.
+/// One object of every run, at a random place in its run.
 struct Scattered {
     run: usize,
     chosen: usize,
@@ -66,7 +66,7 @@ impl Scattered {
         Self { run, chosen: 0 }
     }
 
-    /// Whether it is the object `k`. Asked of every object in turn.
+    /// Whether object `k` is chosen. Call it for every object in turn.
     fn is(&mut self, k: usize, rng: &mut Rng) -> bool {
         if k.is_multiple_of(self.run) {
             self.chosen = rng.below(self.run);
@@ -99,7 +99,7 @@ impl Roam {
         self.offsets.push(self.kinds[kind].anywhere(rng));
     }
 
-    /// Puts the objects into a random order, so that neighbours in the list are none in space.
+    /// Shuffles the objects, so that neighbours in the list are no neighbours in space.
     fn shuffled(mut self, rng: &mut Rng) -> Self {
         for last in (1..self.homes.len()).rev() {
             let other = rng.below(last + 1);
@@ -159,7 +159,8 @@ impl Roam {
         roam.shuffled(rng)
     }
 
-    /// Up to eight packs of plates as wide as the world, one object in 33, and cubes in the storeys between the packs.
+    /// Up to eight packs of plates as wide as the world, one object in 33, and cubes in the storeys between the
+    /// packs.
     pub(super) fn plates(objects: usize, rng: &mut Rng) -> Self {
         let wall = wall(objects);
         let plates = objects / 33 + 1;
@@ -190,7 +191,8 @@ impl Roam {
 
     /// One object in ten is a rod along a random axis.
     pub(super) fn rods(objects: usize, rng: &mut Rng) -> Self {
-        // The mean volume in which two of these objects overlap is 42, not 8: 0.1 pairs need a world of 212 per object.
+        // The mean volume in which two of these objects overlap is 42, not 8: 0.1 pairs need a world of 212 per
+        // object.
         let wall = (cube_root(212.0 * objects as f64) * 0.5) as f32;
         let mut kinds = vec![Kind::cubes([wall; 3]); 4];
         (0..3).for_each(|axis| kinds[axis].half[axis] = 15.0);
@@ -203,7 +205,8 @@ impl Roam {
         roam
     }
 
-    /// A hilly ground of fixed boxes that overlap their 24 neighbours, and one object in twenty that moves above and in it.
+    /// A hilly ground of fixed boxes that overlap their 24 neighbours, and one object in twenty that moves above and
+    /// in it.
     pub(super) fn static_world(objects: usize, rng: &mut Rng) -> Self {
         let side = (objects as f64).sqrt().ceil() as usize;
         let wall = side as f32 * 0.5;
@@ -238,7 +241,7 @@ impl Roam {
         roam
     }
 
-    /// Unit cubes on one line, each of which overlaps the next ones above and below it.
+    /// Unit cubes on one line, each overlapping those above and below it.
     pub(super) fn tower(objects: usize, rng: &mut Rng) -> Self {
         let mut roam = Self::new(objects, vec![Kind::cubes([0.1; 3])]);
         for k in 0..objects {
@@ -247,7 +250,7 @@ impl Roam {
         roam.shuffled(rng)
     }
 
-    /// Boxes far apart where an evenly spaced sample looks, in the middle of each of 256 equal parts of the list.
+    /// Boxes far apart in the middle of each of 256 equal parts of the list, where an evenly spaced sample looks.
     pub(super) fn aliased(objects: usize, rng: &mut Rng) -> Self {
         let wall = wall(objects);
         let mut roam = Self::new(objects, vec![Kind::cubes([wall; 3])]);
@@ -263,7 +266,7 @@ impl Roam {
         roam
     }
 
-    /// Unit cubes that walk for some frames and all jump to new places then.
+    /// Unit cubes that walk and now and then all jump to new places.
     pub(super) fn teleport(objects: usize, rng: &mut Rng) -> Self {
         let mut roam = Self::new(objects, vec![Kind::cubes([wall(objects); 3])]);
         (0..objects).for_each(|_| roam.add(0, [0.0; 3], rng));
@@ -299,14 +302,14 @@ impl Roam {
         }
     }
 
-    /// Whether the object at this place in the list never moves.
+    /// Whether the object with this index never moves.
     pub(super) fn is_fixed(&self, index: usize) -> bool {
         self.kind_of.get(index).is_some_and(|&kind| self.kinds[usize::from(kind)].step == 0.0)
     }
 }
 
 impl Kind {
-    /// A random place between the walls, seen from the home.
+    /// Returns a random place between the walls, relative to the home.
     fn anywhere(&self, rng: &mut Rng) -> [f32; 3] {
         let u = rng.signed3();
         [0, 1, 2].map(|a| u[a] * self.walls[a])

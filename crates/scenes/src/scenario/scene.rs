@@ -9,7 +9,7 @@ use super::roam::Roam;
 use super::walk::Walk;
 use sapwise::Aabb;
 
-/// Greatest step on each axis in a frame, in edges, where objects move slowly.
+/// Greatest step on each axis in a frame, in edges, of slow objects.
 const STEP: f32 = 0.05;
 
 /// A scene in one of its frames.
@@ -23,7 +23,7 @@ pub struct Scene {
     motion: Motion,
 }
 
-/// What moves the objects, by the state that it needs.
+/// The motion of the objects with its state.
 #[derive(Debug, Clone)]
 enum Motion {
     Walk(Walk),
@@ -74,7 +74,7 @@ impl Scene {
         Self { scenario, objects, frame: 0, boxes, rng, motion }
     }
 
-    /// The boxes of this frame, in the order of the objects. All are valid and finite.
+    /// Returns the boxes of this frame in the order of the objects. All are valid and finite.
     #[must_use]
     pub fn boxes(&self) -> &[Aabb] {
         &self.boxes
@@ -82,8 +82,8 @@ impl Scene {
 
     /// Goes on to the next frame. Allocates nothing.
     ///
-    /// An object keeps its index from frame to frame, except in [`Scenario::Fragmentation`], where objects come and go at
-    /// the end of the list.
+    /// An object keeps its index from frame to frame, except in [`Scenario::Fragmentation`], where objects come and
+    /// go at the end of the list.
     pub fn advance(&mut self) {
         self.frame += 1;
         let (rng, boxes) = (&mut self.rng, &mut self.boxes);
@@ -98,25 +98,26 @@ impl Scene {
         }
     }
 
-    /// How often the scene was advanced.
+    /// Returns the number of the frame, 0 at the start.
     #[must_use]
     pub fn frame(&self) -> u64 {
         self.frame
     }
 
-    /// The kind of scene.
+    /// Returns the kind of scene.
     #[must_use]
     pub fn scenario(&self) -> Scenario {
         self.scenario
     }
 
-    /// The largest number of boxes that any frame has.
+    /// Returns the largest number of boxes in any frame.
     #[must_use]
     pub fn peak_objects(&self) -> usize {
         self.objects
     }
-    /// Whether the object at this place in the list stands still in every frame, as the ground of [`Scenario::StaticWorld`] does:
-    /// what a simulation would call static, and a filter fixed. `false` beyond the end of the list.
+
+    /// Whether the object with this index never moves, like the ground of [`Scenario::StaticWorld`]. `false` beyond
+    /// the end of the list.
     #[must_use]
     pub fn is_fixed(&self, index: usize) -> bool {
         match &self.motion {

@@ -17,7 +17,7 @@ pub(super) struct Walk {
     step: f32,
     /// Objects at the head of the list that never move.
     fixed: usize,
-    /// One object in this many moves in a frame.
+    /// One object of this many moves in a frame.
     sparsity: usize,
 }
 
@@ -34,7 +34,8 @@ impl Walk {
         Self::unit_cubes(objects, [wall, wall, 4.0], step, 1, rng)
     }
 
-    /// Cubes with edges log-uniform from 0.1 to 10, and at the head of the list up to four fixed ones as large as the world.
+    /// Cubes with edges log-uniform from 0.1 to 10, and at the head of the list up to four fixed ones as large as the
+    /// world.
     pub(super) fn mixed(objects: usize, step: f32, rng: &mut Rng) -> Self {
         // Two such cubes overlap in a volume of 285 on average; 1.5 pairs per object need a world of 95 per object.
         let wall = (cube_root(95.0 * objects as f64) * 0.5) as f32;
@@ -77,7 +78,7 @@ impl Walk {
         boxes.extend(self.centres.iter().zip(&self.halves).map(|(&centre, &half)| Aabb::cube(centre, half)));
     }
 
-    /// Whether the object at this place in the list never moves.
+    /// Whether the object with this index never moves.
     pub(super) fn is_fixed(&self, index: usize) -> bool {
         index < self.fixed
     }
@@ -96,7 +97,8 @@ impl Walk {
     }
 }
 
-/// A coordinate thrown back by the walls at -`wall` and `wall`. One that lies beyond by more than the world ends at a wall.
+/// Reflects a coordinate at the walls at -`wall` and `wall`. One that is beyond by more than the world ends at a
+/// wall.
 #[inline]
 pub(super) fn reflect(at: f32, wall: f32) -> f32 {
     if at > wall {

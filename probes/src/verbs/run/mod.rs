@@ -1,6 +1,5 @@
 //! `sapwise run`: the adaptive choice on a stream of frames, beside every fixed algorithm.
 
-mod answer;
 mod text;
 mod tuning;
 
@@ -8,7 +7,7 @@ use crate::algorithms::Algorithms;
 use crate::args::{Run, Scene};
 use crate::exit::{Outcome, WrongUsage};
 use crate::outputs::check_picture;
-use crate::replay::{FrameSource, ReplaySettings, Swing, check_trace, picture, replay, too_wide, write_trace};
+use crate::replay::{FrameSource, ReplaySettings, Swing, check_trace, replay, too_wide, write_trace};
 use crate::terminal::Terminal;
 use crate::{interrupt, output, outputs};
 use anyhow::{Context, bail};
@@ -18,13 +17,12 @@ use sapwise_lab::write::write_text;
 use sapwise_scenes::{Frames, Scenario};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use text::Answer;
 
-/// Objects of a scenario where nothing is said.
+/// Objects of a scenario without `--objects`.
 const OBJECTS: u32 = 20_000;
-/// Frames of a scenario where nothing is said, but for fragmentation, whose cycle they are.
+/// Frames of a scenario without `--frames`. Fragmentation has its cycle instead.
 const FRAMES: usize = 200;
-/// Frames that learning may take before the figures count: five seconds of a game.
-const LEARNED_BY: usize = 300;
 
 pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
     let mut registry = algorithms.registry(usable_cores());
@@ -33,7 +31,7 @@ pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Ou
     arguments.plot.as_deref().map_or(Ok(()), check_picture)?;
     check_outputs(arguments)?;
     let mut settings = settings(arguments)?;
-    let cuts = cuts(arguments, settings.frames)?;
+    let parts = parts(&arguments.after, settings.frames)?;
     let read = arguments.tuning.as_deref().map(|path| tuning::read(path, &registry, &arguments.gpus)).transpose()?;
     // Until here Ctrl-C ends the program, even when it waits for a pipe.
     interrupt::listen()?;
@@ -52,30 +50,35 @@ pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Ou
     origin.tuning.warnings.extend(gpu_warnings);
     // Steps have no costs to correct.
     settings.learning &= !origin.tuning.costs.is_empty();
-    settings.exploring &= settings.learning;
     let hint = "none of the algorithms of the tuning runs here; leave out --tuning to predict for this machine";
     let mut outcome = replay(&settings, &origin.tuning, &registry).map_err(|error| match error.downcast_ref() {
         Some(sapwise::Error::Unavailable { .. } | sapwise::Error::UnknownAlgorithm { .. }) => error.context(hint),
         _ => recorded(error),
     })?;
     origin.tuning.warnings.append(&mut outcome.notes);
-    let segments: Vec<_> = segments(&cuts, settings.frames).into_iter().map(|range| outcome.part(range)).collect();
-    let answer = answer::Answer::new(&settings, &outcome, &origin, too_wide(&origin.tuning, &registry), &segments);
+    let answer = Answer {
+        settings: &settings,
+        outcome: &outcome,
+        origin: &origin,
+        too_wide: too_wide(&origin.tuning, &registry),
+        whole: outcome.part(0..settings.frames),
+        parts: parts.into_iter().map(|range| outcome.part(range)).collect(),
+    };
     if let Some(path) = &arguments.trace {
         write_trace(path, &outcome)?;
     }
     if let Some(path) = &arguments.plot {
-        write_text(path, &picture(&settings, &outcome, text::caption(arguments, &answer, &origin)).svg()?)?;
+        write_text(path, &outcome.picture(settings.source.name(), answer.caption()).svg()?)?;
     }
     if arguments.json {
-        output::print_json(&answer)?;
+        output::print_json(&answer.json()?)?;
     } else {
-        output::print(&text::text(arguments, &answer, &origin, Terminal::of_standard_output()))?;
+        output::print(&answer.text(arguments, Terminal::of_standard_output()))?;
     }
     Ok(if outcome.interrupted { Outcome::Failed } else { Outcome::Done })
 }
 
-/// Refuses what can't be written: after the run its figures would be lost with the file.
+/// Refuses outputs that can't be written, before the run.
 ///
 /// # Errors
 /// Names the file.
@@ -112,17 +115,10 @@ fn settings(arguments: &Run) -> anyhow::Result<ReplaySettings> {
             (FrameSource::Scene { scenario: *scenario, objects, seed: arguments.seed, swing }, frames)
         }
         Scene::Stream(path) => {
-            let wrong = |what: &str| {
-                Err(WrongUsage(format!("{what}: {} is a stream, whose boxes are recorded", path.display())))
-            };
-            if arguments.objects.is_some() {
-                wrong("--objects")?;
-            }
-            if arguments.swing.is_some() {
-                wrong("--swing")?;
-            }
-            if arguments.record.is_some() {
-                wrong("--record")?;
+            let given = [arguments.objects.is_some(), arguments.swing.is_some(), arguments.record.is_some()];
+            if let Some((option, _)) = ["--objects", "--swing", "--record"].iter().zip(given).find(|(_, given)| *given) {
+                let why = format!("{option}: {} is a stream, whose boxes are recorded", path.display());
+                return Err(WrongUsage(why).into());
             }
             let frames = read_stream(path)?;
             let own = frames.len();
@@ -140,8 +136,6 @@ fn settings(arguments: &Run) -> anyhow::Result<ReplaySettings> {
         repeats: arguments.repeats as usize,
         seed: arguments.seed,
         learning: !arguments.no_learning,
-        exploring: !arguments.no_exploring,
-        co_runner: arguments.co_runner,
     })
 }
 
@@ -154,73 +148,32 @@ fn read_stream(path: &Path) -> anyhow::Result<Frames> {
     Ok(frames)
 }
 
-/// The frames at which a segment ends and another begins, ascending.
+/// The frames between those of `--after`; none without that option.
 ///
 /// # Errors
-/// When one lies outside of the run.
-fn cuts(arguments: &Run, frames: usize) -> Result<Vec<usize>, WrongUsage> {
-    let within = |option: &str, frame: usize, first: usize| {
-        if (first..frames).contains(&frame) {
-            return Ok(());
-        }
+/// When one of them lies outside of the run.
+fn parts(after: &[usize], frames: usize) -> Result<Vec<Range<usize>>, WrongUsage> {
+    if let Some(wrong) = after.iter().find(|after| !(1..frames).contains(after)) {
         let last = frames - 1;
-        Err(WrongUsage(format!("{option} {frame}: give a frame from {first} to {last}, or more --frames")))
-    };
-    arguments.after.iter().try_for_each(|&frame| within("--after", frame, 1))?;
-    let from = arguments.co_runner.map(|c| c.from_frame);
-    from.map_or(Ok(()), |frame| within("--co-runner", frame, 0))?;
-    let mut cuts = arguments.after.clone();
-    if cuts.is_empty() && !arguments.no_learning {
-        cuts.push(from.unwrap_or(0) + LEARNED_BY);
+        return Err(WrongUsage(format!("--after {wrong}: give a frame from 1 to {last}, or more --frames")));
     }
-    cuts.extend(from);
-    cuts.retain(|cut| (1..frames).contains(cut));
-    cuts.sort_unstable();
-    cuts.dedup();
-    Ok(cuts)
-}
-
-/// The segments between the cuts; none where there is no cut.
-fn segments(cuts: &[usize], frames: usize) -> Vec<Range<usize>> {
-    if cuts.is_empty() {
-        return Vec::new();
-    }
-    let ends = cuts.iter().copied().chain([frames]);
-    [0].iter().chain(cuts).copied().zip(ends).map(|(from, to)| from..to).collect()
+    let mut ends = [after, &[0, frames]].concat();
+    ends.sort_unstable();
+    ends.dedup();
+    let parts = ends.windows(2).map(|w| w[0]..w[1]);
+    Ok(if after.is_empty() { Vec::new() } else { parts.collect() })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::Parser;
-
-    fn arguments(words: &[&str]) -> Run {
-        let words = ["sapwise", "run", "uniform"].iter().chain(words);
-        match crate::args::Arguments::parse_from(words).verb {
-            crate::args::Verb::Run(run) => run,
-            _ => panic!("another verb"),
-        }
-    }
 
     #[test]
-    fn segments_lie_between_the_cuts() {
-        let cuts = |words: &[&str], frames| cuts(&arguments(words), frames).unwrap();
-        assert_eq!(cuts(&[], 200), [0; 0]);
-        assert_eq!(cuts(&[], 301), [300]);
-        assert_eq!(cuts(&["--no-learning"], 900), [0; 0]);
-        assert_eq!(cuts(&["--after", "50,20", "--after", "50"], 200), [20, 50]);
-        assert_eq!(cuts(&["--co-runner", "450"], 900), [450, 750]);
-        assert_eq!(cuts(&["--co-runner", "0"], 900), [300]);
-        assert_eq!(cuts(&["--co-runner", "450:1", "--after", "100", "--no-learning"], 900), [100, 450]);
-        assert_eq!(segments(&[20, 50], 200), [0..20, 20..50, 50..200]);
-        assert!(segments(&[], 200).is_empty());
-    }
-
-    #[test]
-    fn frames_beyond_the_end_are_refused() {
-        for words in [["--after", "200"], ["--after", "0"], ["--co-runner", "200"]] {
-            let why = cuts(&arguments(&words), 200).unwrap_err().to_string();
-            assert!(why.contains(words[0]) && why.contains("to 199"), "{why}");
+    fn parts_lie_between_the_frames_of_after() {
+        assert_eq!(parts(&[50, 20, 50], 200).unwrap(), [0..20, 20..50, 50..200]);
+        assert!(parts(&[], 200).unwrap().is_empty());
+        for outside in [0, 200] {
+            assert!(parts(&[outside], 200).unwrap_err().to_string().contains("1 to 199"));
         }
     }
 }

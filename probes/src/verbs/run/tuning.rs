@@ -7,14 +7,14 @@ use crate::hardware::measure_hardware;
 use crate::prediction::{self, Slice};
 use crate::{output, revisions};
 use anyhow::{Context, bail};
-use sapwise::{AlgorithmId, Registry, Source, Tuning, measure};
+use sapwise::{AlgorithmId, GpuIdentity, Registry, Source, Tuning, measure};
 use sapwise_lab::data::{Document, read_document, usual_scenario};
 use sapwise_lab::fit::measured_tuning;
 use sapwise_scenes::Scenario;
 use serde::Serialize;
 use std::path::Path;
 
-/// The tuning, and what is said about it.
+/// A tuning and its source.
 pub(super) struct Origin {
     pub(super) tuning: Tuning,
     pub(super) from: OriginKind,
@@ -22,7 +22,6 @@ pub(super) struct Origin {
     pub(super) other_machine: Option<String>,
 }
 
-/// What it was taken from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum OriginKind {
@@ -35,42 +34,39 @@ pub(super) enum OriginKind {
 }
 
 impl Origin {
-    /// Where the tuning comes from, in a sentence.
+    /// The source in a few words.
     pub(super) fn text(&self) -> String {
         let Tuning { source, model, .. } = &self.tuning;
         let model = model.as_ref().map_or(String::new(), |name| format!(" by the model {name}"));
-        match (self.from, source) {
-            (OriginKind::Prediction, _) => format!("predicted for this machine{model}"),
-            (OriginKind::Report, _) => match &self.other_machine {
-                Some(cpu) => format!("measured on another machine ({cpu})"),
-                None => "measured on this machine".to_owned(),
-            },
-            (OriginKind::Tuning, Source::Default) => "from a file, written by hand".to_owned(),
-            (OriginKind::Tuning, Source::Predicted) => format!("from a file, predicted{model}"),
-            (OriginKind::Tuning, Source::Measured) => "from a file, measured".to_owned(),
-            (OriginKind::Tuning, Source::Learned) => format!("from a file, learned on line{model}"),
-            (OriginKind::Tuning, _) => "from a file".to_owned(),
+        match (self.from, &self.other_machine, source) {
+            (OriginKind::Prediction, ..) => format!("predicted for this machine{model}"),
+            (OriginKind::Report, Some(cpu), _) => format!("measured on another machine ({cpu})"),
+            (OriginKind::Report, None, _) => "measured on this machine".to_owned(),
+            (OriginKind::Tuning, _, Source::Default) => "from a file, written by hand".to_owned(),
+            (OriginKind::Tuning, _, Source::Predicted) => format!("from a file, predicted{model}"),
+            (OriginKind::Tuning, _, Source::Measured) => "from a file, measured".to_owned(),
+            (OriginKind::Tuning, ..) => format!("from a file, learned from frames{model}"),
         }
     }
 }
 
-/// Tuning predicted for this machine.
+/// Predicts a tuning for this machine.
 ///
 /// # Errors
-/// When no process can be started, a GPU that was asked for is not there, or the model predicts none of the algorithms.
+/// When no process can be started, this machine lacks a GPU that `--gpu` names, or the model predicts no algorithm.
 pub(super) fn predicted(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Origin> {
     let (hardware, measured) = measure_hardware(None, &arguments.gpus)?;
     let model = prediction::model(None)?;
-    let (usable, slice) = (&measured.usable, Slice::of(Scenario::Uniform)?);
-    let mut tuning = prediction::predict(&model.model, &hardware, usable, &slice, algorithms)?;
+    let slice = Slice::of(Scenario::Uniform)?;
+    let mut tuning = prediction::predict(&model.model, &hardware, &measured.usable, &slice, algorithms)?;
     tuning.warnings.extend(measured.remarks);
     Ok(Origin { tuning, from: OriginKind::Prediction, other_machine: None })
 }
 
-/// The tuning of a file, which may be a report whose timings they are measured from.
+/// Reads a tuning, or computes one from the timings of a report.
 ///
 /// # Errors
-/// When the file is neither, or tells of other revisions of the algorithms than those of this build.
+/// When the file is neither, or holds other revisions of the algorithms than this build.
 pub(super) fn read(path: &Path, registry: &Registry, choice: &GpuChoice) -> anyhow::Result<Origin> {
     let fresh = |stale: Vec<String>| match &stale[..] {
         [] => Ok(()),
@@ -95,7 +91,7 @@ pub(super) fn read(path: &Path, registry: &Registry, choice: &GpuChoice) -> anyh
     }
 }
 
-/// Adds the algorithms on the GPUs that are taken, where the tuning names any, and returns what keeps some from running.
+/// Adds the algorithms on the GPUs that the tuning names and the options admit, and returns why some can't run.
 ///
 /// # Errors
 /// When no process can be started.
@@ -110,20 +106,17 @@ pub(super) fn add_gpus(registry: &mut Registry, tuning: &Tuning, choice: &GpuCho
     }
     let seen = gpus::look()?;
     choice.check(&seen)?;
+    let taken: Vec<GpuIdentity> = seen.identities.iter().filter(|g| choice.takes(g)).cloned().collect();
     let mut warnings: Vec<String> = Vec::new();
-    let (taken, left_out): (Vec<_>, Vec<_>) = seen.identities.iter().cloned().partition(|g| choice.takes(g));
     for id in named {
-        let out = left_out.iter().find(|g| gpus::uses(id).contains(&g.index));
-        warnings.extend(seen.lacks(gpus::uses(id)).map(|why| format!("{id} is left out: {why}")));
-        warnings.extend(out.map(|g| match choice.only[..] {
-            [] => {
-                format!(
-                    "{id} is left out: gpu{} ({}) is a software adapter; use --software-gpus to run it",
-                    g.index, g.name
-                )
+        let is_taken = |k: &u32| taken.iter().any(|g| g.index == *k);
+        match seen.lacks(gpus::uses(id)) {
+            Some(why) => warnings.push(format!("{id} is left out: {why}")),
+            None if !gpus::uses(id).iter().all(is_taken) => {
+                warnings.push(format!("{id} is left out: name its GPUs with --gpu, or use --software-gpus"));
             }
-            _ => format!("{id} is left out: --gpu does not name gpu{}", g.index),
-        }));
+            None => {}
+        }
     }
     if !taken.is_empty() {
         match seen.load() {
