@@ -104,7 +104,9 @@ fn trained_on(training: &Training) -> String {
         let host = report.file.split_once('/').map_or(&report.host[..], |(folder, _)| folder);
         *hosts.entry((host, kind(report.label))).or_default() += 1;
     }
-    rows.extend(hosts.iter().map(|((host, label), reports)| vec![(*host).to_owned(), reports.to_string(), (*label).to_owned()]));
+    rows.extend(
+        hosts.iter().map(|((host, label), reports)| vec![(*host).to_owned(), reports.to_string(), (*label).to_owned()]),
+    );
     for counted in &training.trained_on_counts {
         let hosts = count(counted.physical_machines, "host");
         rows.push(vec![hosts, counted.reports.to_string(), kind(counted.label).to_owned()]);
@@ -176,7 +178,7 @@ pub fn scores(validation: &Validation, draw: impl Fn(&[Vec<String>]) -> String) 
             percent(m.share_over_10_percent),
         ]);
     }
-    for f in floor {
+    if let Some(f) = floor {
         for (name, of) in [("floor", &f.cells), ("another run's full sweep", &f.full_sweep)] {
             let Split { all, one_thread, several_threads } = of;
             let name = format!("{name}, {}", count(f.pairs, "pair"));
@@ -251,9 +253,6 @@ mod tests {
         let coverage =
             crate::Coverage { physical_machines: 3, times_90_ln: 0.5, times: 0.91, ratios_90_ln: 0.2, ratios: 0.88 };
         let told = intervals(&Validation { coverage: Some(coverage), ..Validation::default() });
-        assert!(
-            told.contains("3 hosts") && told.contains("within 1.22") && told.contains("88.0 %"),
-            "{told}"
-        );
+        assert!(told.contains("3 hosts") && told.contains("within 1.22") && told.contains("88.0 %"), "{told}");
     }
 }

@@ -126,8 +126,8 @@ impl PairedRatio {
         let told: Vec<f64> = self.sizes.iter().map(|size| size.told(NORMAL_90)).collect();
         // Where the ratio becomes distinct on the way from one size to the next, which is distinct.
         let edge = |within: usize, beyond: usize| {
-            let (from, to) = (told[within].clamp(-1.0, 1.0), told[beyond].signum());
-            let share = if from == to { 0.0 } else { (to - from) / (told[beyond] - from) };
+            let (from, to) = (told[within], told[beyond].signum());
+            let share = if from * to >= 1.0 { 0.0 } else { (to - from) / (told[beyond] - from) };
             between(self.sizes[within].ln_objects, self.sizes[beyond].ln_objects, share).exp()
         };
         let sizes = || (0..told.len()).map(|k| (k, self.sizes[k].ln_objects));

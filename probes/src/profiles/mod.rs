@@ -202,6 +202,8 @@ mod tests {
         assert_eq!(disturbed, Ok(Some("other programs disturbed it".to_owned())));
         assert!(lack(&[], &|r| r.remarks.push("interrupted".to_owned())).unwrap().is_some());
         assert!(lack(&["--seed=2"], &|_| ()).unwrap_err().contains("another command"));
-        assert!(lack(&[], &|r| r.hardware.machine.physical_id = "1".repeat(16)).unwrap_err().contains("another machine"));
+        assert!(
+            lack(&[], &|r| r.hardware.machine.physical_id = "1".repeat(16)).unwrap_err().contains("another machine")
+        );
     }
 }

@@ -36,7 +36,7 @@ pub(crate) fn is_real(gpu: &GpuHardware) -> bool {
 }
 
 /// Returns the first GPU that is no software adapter.
-pub(crate) fn first_real_gpu(hardware: &Hardware) -> Option<&GpuHardware> {
+fn first_real_gpu(hardware: &Hardware) -> Option<&GpuHardware> {
     hardware.gpus.iter().find(|g| is_real(g))
 }
 

@@ -202,7 +202,8 @@ mod tests {
 
     #[test]
     fn a_report_is_named_by_its_folder_and_file() {
-        let names = ["datasets/a/full.json", "full.json", "./full.json", "../full.json"].map(|path| name(path.as_ref()));
+        let names =
+            ["datasets/a/full.json", "full.json", "./full.json", "../full.json"].map(|path| name(path.as_ref()));
         assert_eq!(names, ["a/full.json", "full.json", "full.json", "full.json"]);
     }
 }

@@ -7,7 +7,6 @@ mod selection;
 
 pub(crate) use compared::is_real;
 pub use compared::{COMPARED, COMPARED_OF_GPUS, figure};
-pub(crate) use compared::{first_real_gpu, is_real};
 pub use files::{Document, read_document, read_report, read_reports, read_text, report_files};
 pub use profile::{Profile, Spot, host, is_sound, machines, usual_scenario};
 pub use selection::{LeftOut, Selection};

@@ -135,8 +135,7 @@ mod tests {
         contended.label = Label::RealContended;
         let clock = megahertz.hardware.parameters.iter_mut().find(|p| p.name == "clock_measured_ghz").unwrap();
         clock.value = clock.value.map(|ghz| ghz * 1000.0);
-        let (profiles, notes) =
-            selected([published, debug, empty, contended.clone(), megahertz, good.clone(), good]);
+        let (profiles, notes) = selected([published, debug, empty, contended.clone(), megahertz, good.clone(), good]);
         assert_eq!(profiles.len(), 1);
         let said = [
             "published",

@@ -219,11 +219,7 @@ impl Fitted<'_> {
 }
 
 /// Chooses the cheapest by costs, or nothing, which counts as the worst, without any.
-fn by<'a>(
-    name: &'static str,
-    costs: Option<&'a [AlgorithmCost]>,
-    available: &'a [AlgorithmId],
-) -> Contestant<'a> {
+fn by<'a>(name: &'static str, costs: Option<&'a [AlgorithmCost]>, available: &'a [AlgorithmId]) -> Contestant<'a> {
     let costs = costs.unwrap_or_default();
     let choose = if costs.is_empty() { nothing() } else { by_costs(costs.to_vec(), available) };
     Contestant { name, choose, costs: Some(costs) }

@@ -65,7 +65,7 @@ fn influence(crossover: String, names: &[&'static str], rows: &[(&Profile, f64)]
         names.iter().copied().filter(|name| rows.iter().all(|(profile, _)| ln(profile, name).is_some())).collect();
     let table = Array2::from_shape_fn((rows.len(), names.len()), |(k, j)| ln(rows[k].0, names[j]).unwrap_or_default());
     let values: Vec<f64> = rows.iter().map(|r| r.1).collect();
-    let line = Line::least_squares(&table, &values)?.0;
+    let line = Line::least_squares(&table, &values)?;
     if line.columns.kept.is_empty() {
         return Ok(None);
     }

@@ -272,7 +272,11 @@ fn nanoseconds(
     };
     let sum = |component: &Component| -> Result<f64, PredictError> {
         let terms = component.0.iter();
-        terms.map(|&(times, term, scale)| Ok(times * term.count(&row.load, cache) * scale.nanoseconds(hardware, backend)?)).sum()
+        terms
+            .map(|&(times, term, scale)| {
+                Ok(times * term.count(&row.load, cache) * scale.nanoseconds(hardware, backend)?)
+            })
+            .sum()
     };
     components.iter().map(sum).collect()
 }

@@ -62,7 +62,11 @@ fn completed(hardware: &Hardware) -> Hardware {
         let missing = list.iter().all(|p| p.name != name || p.value.is_none());
         let Some(bounds) = quantity.bounds.filter(|_| quantity.read_by_model && missing) else { return };
         list.retain(|p| p.name != name);
-        list.push(Parameter::reported(name, (bounds.least * bounds.most).sqrt(), "stands in for what was not measured"));
+        list.push(Parameter::reported(
+            name,
+            (bounds.least * bounds.most).sqrt(),
+            "stands in for what was not measured",
+        ));
     };
     ParameterId::ALL.iter().for_each(|id| add(&mut completed.parameters, id.quantity(), id.as_str()));
     for gpu in &mut completed.gpus {

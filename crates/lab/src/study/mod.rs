@@ -8,7 +8,7 @@ mod map;
 mod page;
 
 use crate::Report;
-use crate::data::{Evidence, Profile, Selection, read_reports};
+use crate::data::{Profile, Selection, read_reports};
 use crate::fit::{measured_costs, measured_slice, slice_tuning};
 use crate::progress::Progress;
 use crate::report::Label;
@@ -117,8 +117,8 @@ impl Material {
     fn new(reports: Vec<(String, Report)>, progress: &dyn Progress) -> Result<Self> {
         // Published parameters come without timings, which is no news.
         let timed = reports.iter().filter(|(_, report)| report.label != Label::Published);
-        let mut selection = Selection::new(Evidence::Real);
-        timed.for_each(|(file, report)| selection.add(selection.reduce(file, report)));
+        let mut selection = Selection::default();
+        timed.for_each(|(file, report)| selection.add(Selection::reduce(file, report)));
         let (profiles, mut notes) = selection.clone().finish();
         let trained = match train(selection, "study", progress) {
             Ok(trained) => {

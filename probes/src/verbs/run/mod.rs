@@ -116,7 +116,8 @@ fn settings(arguments: &Run) -> anyhow::Result<ReplaySettings> {
         }
         Scene::Stream(path) => {
             let given = [arguments.objects.is_some(), arguments.swing.is_some(), arguments.record.is_some()];
-            if let Some((option, _)) = ["--objects", "--swing", "--record"].iter().zip(given).find(|(_, given)| *given) {
+            if let Some((option, _)) = ["--objects", "--swing", "--record"].iter().zip(given).find(|(_, given)| *given)
+            {
                 let why = format!("{option}: {} is a stream, whose boxes are recorded", path.display());
                 return Err(WrongUsage(why).into());
             }

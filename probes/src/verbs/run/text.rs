@@ -94,16 +94,21 @@ impl Answer<'_> {
         let mut lines = vec![terminal.head(&head), format!("{}\n", self.tuning()), self.totals(terminal)];
         for (k, id) in outcome.fixed.iter().enumerate() {
             let missed = outcome.fixed_times(k).err().map(|missed| count(missed, "frame"));
-            lines.extend(missed.map(|m| format!("{id} was not timed in {m}: it failed or was far slower than the best.")));
+            lines.extend(
+                missed.map(|m| format!("{id} was not timed in {m}: it failed or was far slower than the best.")),
+            );
         }
         lines.push(self.comparison(terminal));
         if let (Some(ratio), Some(id)) = (self.whole.over_best_fixed, self.best_fixed()) {
             lines.push(format!("Adaptive takes {ratio:.3} × the time of {id}, the best single algorithm."));
         }
-        lines.push(format!("The oracle runs the best algorithm of every {WINDOW} frames. {}", match outcome.repeats {
-            1 => "With one repeat it chooses and is timed on the same frames, which noise favours.",
-            _ => "It chooses on one half of the repeats and is timed on the other.",
-        }));
+        lines.push(format!(
+            "The oracle runs the best algorithm of every {WINDOW} frames. {}",
+            match outcome.repeats {
+                1 => "With one repeat it chooses and is timed on the same frames, which noise favours.",
+                _ => "It chooses on one half of the repeats and is timed on the other.",
+            }
+        ));
         lines.extend(outcome.foreign_load.map(|load| format!("Other programs took {:.0} % of the CPU.", load * 100.0)));
         lines.extend(self.warnings().iter().map(|warning| format!("{} {warning}", terminal.warning("warning:"))));
         if outcome.interrupted {
@@ -134,8 +139,9 @@ impl Answer<'_> {
         let mut fixed: Vec<(usize, Times)> =
             (0..outcome.fixed.len()).filter_map(|k| Some((k, outcome.fixed_times(k).ok()?))).collect();
         fixed.sort_by(|a, b| a.1.total_ms.total_cmp(&b.1.total_ms));
-        let of_fixed =
-            |(k, times): &(usize, Times)| row(&outcome.fixed[*k].to_string(), times, count(outcome.frames_run(*k), "frame"));
+        let of_fixed = |(k, times): &(usize, Times)| {
+            row(&outcome.fixed[*k].to_string(), times, count(outcome.frames_run(*k), "frame"))
+        };
         rows.extend(fixed.iter().map(of_fixed));
         terminal.table(&rows)
     }
