@@ -1,7 +1,9 @@
 //! What one decision costs: the ranking alone, and the whole of `Adaptive::decide` with its sampled estimate.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use sapwise::{Adaptive, BroadPhase, Hardware, Load, Machine, Model, Pairs, Parameter, ParameterId, Registry, Tuning};
+use sapwise::{Adaptive, BroadPhase, Pairs, Registry, Tuning};
+use sapwise::algorithm::Load;
+use sapwise_tune::{Hardware, Machine, Model, Parameter, ParameterId};
 use sapwise_scenes::Scenario;
 use std::hint::black_box;
 

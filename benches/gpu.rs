@@ -17,8 +17,9 @@
 //! Criterion can't interleave its candidates. Without `--bench`, which `cargo bench` passes, only the smallest size is
 //! run. Exit status 1 if a contestant failed or found other pairs.
 
-use sapwise::gpu::{Gpu, Gpus, Resident, ResidentPairs, wgpu30 as wgpu};
-use sapwise::{Aabb, AlgorithmId, Backend, BroadPhase, Pairs, Registry, usable_cores};
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Pairs, Registry};
+use sapwise::algorithm::{Backend, usable_cores};
+use sapwise_gpu::{Gpu, Gpus, Resident, ResidentPairs, wgpu30 as wgpu};
 use sapwise_scenes::Scenario;
 use std::hint::black_box;
 use std::io::Write;
@@ -251,7 +252,7 @@ fn bench() -> Result<Vec<String>, String> {
     let gpus = Gpus::find();
     let mut registry = Registry::new();
     registry.pin_threads();
-    registry.add_gpus(&gpus);
+    sapwise_gpu::add_to(&mut registry, &gpus);
     if gpus.is_empty() {
         println!("No GPU was found: the CPU alone.");
     }

@@ -1,7 +1,9 @@
 //! What a prediction costs from the text of a model to the tuning: reading, predicting, and cutting a slice.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use sapwise::{Entry, Hardware, Load, Machine, Model, Parameter, ParameterId, Registry, json};
+use sapwise::Registry;
+use sapwise::algorithm::{Entry, Load};
+use sapwise_tune::{Hardware, Machine, Model, Parameter, ParameterId, json};
 use std::hint::black_box;
 
 const CORES: u32 = 8;

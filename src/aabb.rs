@@ -7,7 +7,7 @@ use crate::error::{BoxDefect, Error};
 /// 24 bytes, minimum then maximum, so that a `&[f32]` of shape `n x 6` has the same layout. Bounds may be infinite. A
 /// box is valid if no bound is NaN and no minimum lies above its maximum.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-#[cfg_attr(feature = "gpu", derive(bytemuck::Pod, bytemuck::Zeroable))]
+#[cfg_attr(feature = "bytemuck", derive(bytemuck::Pod, bytemuck::Zeroable))]
 #[repr(C)]
 pub struct Aabb {
     /// Lowest x, y and z.

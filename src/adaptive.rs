@@ -10,7 +10,6 @@ mod motion_watch;
 mod passed;
 mod policy;
 mod runner;
-#[cfg(feature = "this-machine")]
 mod setup;
 mod shelter;
 mod switching;
@@ -32,9 +31,7 @@ use std::fmt;
 
 pub use decision::{Decision, Reason};
 pub(crate) use instances::Instances;
-#[cfg(feature = "this-machine")]
 pub(crate) use setup::{Arrival, Background, Start};
-#[cfg(feature = "this-machine")]
 pub use setup::{Origin, SaveError, Setup};
 
 /// Sizes of the slice that learned tuning shows: four a decade from ten to a million, in quarters of a decade.
@@ -47,7 +44,6 @@ const SLICE: std::ops::RangeInclusive<u32> = 4..=24;
 pub struct Adaptive {
     runner: Runner,
     /// How it came to its tuning.
-    #[cfg(feature = "this-machine")]
     start: Start,
 }
 
@@ -68,7 +64,6 @@ impl Adaptive {
     pub(crate) fn with(tuning: Tuning, made: Instances) -> Self {
         Self {
             runner: Runner::new(tuning, made),
-            #[cfg(feature = "this-machine")]
             start: Start::default(),
         }
     }
@@ -144,7 +139,6 @@ impl Adaptive {
     }
 
     /// Takes the tuning from the background thread once it is there.
-    #[cfg(feature = "this-machine")]
     pub(crate) fn take_over(&mut self) {
         let arrived = self.start.arrived();
         self.runner.set_awaits(self.start.background.is_some());
@@ -154,7 +148,6 @@ impl Adaptive {
     }
 
     /// Where its tuning came from, what went wrong on the way and how long it took.
-    #[cfg(feature = "this-machine")]
     #[must_use]
     pub fn setup(&self) -> &Setup {
         &self.start.setup
@@ -165,13 +158,11 @@ impl Adaptive {
     ///
     /// # Errors
     /// When there is no cache or its file can't be written.
-    #[cfg(feature = "this-machine")]
     pub fn save(&self) -> Result<bool, SaveError> {
         self.start.save(|| self.learned())
     }
 
     /// Begins with what a start on this machine found.
-    #[cfg(feature = "this-machine")]
     pub(crate) fn set_start(&mut self, start: Start) {
         self.runner.set_awaits(start.background.is_some());
         self.start = start;
@@ -187,7 +178,6 @@ impl Adaptive {
 
     /// Estimates the load of the next frame and decides, without running anything.
     pub fn decide(&mut self, boxes: &[Aabb]) -> Option<Decision<'_>> {
-        #[cfg(feature = "this-machine")]
         self.take_over();
         self.runner.decide(boxes);
         self.last_decision()
@@ -196,7 +186,6 @@ impl Adaptive {
 
 impl BroadPhase for Adaptive {
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
-        #[cfg(feature = "this-machine")]
         if self.runner.is_open() {
             self.take_over();
         }

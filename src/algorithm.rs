@@ -1,4 +1,10 @@
-//! The names of algorithms.
+//! Names of algorithms, and what your own algorithm needs beside [`BroadPhase`](crate::BroadPhase).
+
+pub use crate::broad_phase::{FrameKind, FrameWork};
+pub use crate::cpu::{SimdLevel, SimdLevelError};
+pub use crate::entry::Entry;
+pub use crate::load::{Displacement, FramePlan, Load};
+pub use crate::registry::{AlgorithmSource, usable_cores};
 
 use std::fmt;
 use std::str::FromStr;
@@ -24,7 +30,7 @@ pub enum Backend {
 
 /// The class of a processor. A method has one cost model and one revision in each class.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum BackendClass {
     /// Threads of the CPU.
@@ -177,14 +183,14 @@ fn number(text: &str) -> Option<u32> {
     text.parse().ok().filter(|n: &u32| n.to_string() == text)
 }
 
-#[cfg(feature = "model")]
+#[cfg(feature = "serde")]
 impl serde::Serialize for AlgorithmId {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
     }
 }
 
-#[cfg(feature = "model")]
+#[cfg(feature = "serde")]
 impl<'de> serde::Deserialize<'de> for AlgorithmId {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let text = String::deserialize(deserializer)?;

@@ -58,7 +58,7 @@ pub struct Fallback {
 
 /// One term of a cost.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub struct CostTerm {
     /// What is counted.

@@ -1,12 +1,14 @@
 //! Why a search finds no answer.
 
-#[cfg(feature = "gpu")]
 mod gpu;
 
 use crate::algorithm::AlgorithmId;
 use std::fmt;
 
-#[cfg(feature = "gpu")]
+pub use crate::algorithm::ParseIdError;
+pub use crate::cost::CurveError;
+pub use crate::named::UnknownName;
+pub use crate::tuning::TuningError;
 pub use gpu::{GpuError, GpuErrorKind};
 
 /// Why a broad phase returned no answer. The content of the pairs is unspecified after an error.
@@ -116,7 +118,6 @@ pub enum Unavailable {
     /// Every algorithm of the tuning failed.
     AllFailed,
     /// Its GPU can't run it.
-    #[cfg(feature = "gpu")]
     Gpu(GpuError),
     /// Another reason, in a sentence: for your own algorithms.
     Other(String),
@@ -167,7 +168,6 @@ impl fmt::Display for Unavailable {
             }
             Self::FailedBefore => f.write_str("failed in an earlier frame"),
             Self::AllFailed => f.write_str("every algorithm of the tuning has failed"),
-            #[cfg(feature = "gpu")]
             Self::Gpu(error) => error.fmt(f),
             Self::Other(text) => f.write_str(text),
         }
@@ -212,7 +212,6 @@ impl fmt::Display for Error {
 impl std::error::Error for Error {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         match self {
-            #[cfg(feature = "gpu")]
             // This text contains that of the error, but not that of its source.
             Self::Unavailable { reason: Unavailable::Gpu(error), .. } => error.source(),
             _ => None,

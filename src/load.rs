@@ -20,7 +20,7 @@ pub(crate) use strip_grid::{StripGrid, StripSpan};
 /// The number of boxes alone decides badly: measured crossovers differ by a factor of five between uniform and
 /// clustered scenes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct Load {

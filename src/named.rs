@@ -5,11 +5,17 @@ use std::fmt;
 /// The error of a name that this version does not know.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UnknownName {
-    pub(crate) kind: &'static str,
-    pub(crate) text: String,
+    kind: &'static str,
+    text: String,
 }
 
 impl UnknownName {
+    /// Makes the error of a text that is no name of this kind.
+    #[must_use]
+    pub fn new(kind: &'static str, text: &str) -> Self {
+        Self { kind, text: text.to_owned() }
+    }
+
     /// Returns the name.
     #[must_use]
     pub fn text(&self) -> &str {
@@ -27,6 +33,8 @@ impl std::error::Error for UnknownName {}
 
 /// Defines an enum without data whose variants have names: `ALL`, `as_str`, `Display`, `FromStr`, and the same names in
 /// files.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! named {
     ($(#[$meta:meta])* $seen:vis enum $name:ident($kind:literal) {
         $($(#[$doc:meta])* $variant:ident = $text:literal,)+
@@ -56,42 +64,70 @@ macro_rules! named {
         }
 
         impl std::str::FromStr for $name {
-            type Err = crate::named::UnknownName;
+            type Err = $crate::error::UnknownName;
 
             fn from_str(text: &str) -> Result<Self, Self::Err> {
                 match text {
                     $($text => Ok(Self::$variant),)+
-                    _ => Err(crate::named::UnknownName { kind: $kind, text: text.to_owned() }),
+                    _ => Err($crate::error::UnknownName::new($kind, text)),
                 }
             }
         }
 
-        #[cfg(feature = "model")]
-        impl serde::Serialize for $name {
-            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        $crate::named_in_files!($name);
+        $crate::named_in_schemas!($name);
+    };
+}
+
+/// Writes the names into files. A macro of its own, because a `cfg` in a macro asks for the features of the caller.
+#[doc(hidden)]
+#[macro_export]
+#[cfg(feature = "serde")]
+macro_rules! named_in_files {
+    ($name:ident) => {
+        impl $crate::internals::serde::Serialize for $name {
+            fn serialize<S: $crate::internals::serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
                 serializer.serialize_str(self.as_str())
             }
         }
 
-        #[cfg(feature = "model")]
-        impl<'de> serde::Deserialize<'de> for $name {
-            fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        impl<'de> $crate::internals::serde::Deserialize<'de> for $name {
+            fn deserialize<D: $crate::internals::serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
                 let text = <std::borrow::Cow<'de, str>>::deserialize(deserializer)?;
-                text.parse().map_err(serde::de::Error::custom)
-            }
-        }
-
-        #[cfg(feature = "schema")]
-        impl schemars::JsonSchema for $name {
-            fn schema_name() -> std::borrow::Cow<'static, str> {
-                stringify!($name).into()
-            }
-
-            fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
-                schemars::json_schema!({ "enum": [$($text),+] })
+                text.parse().map_err($crate::internals::serde::de::Error::custom)
             }
         }
     };
 }
 
-pub(crate) use named;
+#[doc(hidden)]
+#[macro_export]
+#[cfg(not(feature = "serde"))]
+macro_rules! named_in_files {
+    ($name:ident) => {};
+}
+
+/// Lists the names in schemas.
+#[doc(hidden)]
+#[macro_export]
+#[cfg(feature = "schema")]
+macro_rules! named_in_schemas {
+    ($name:ident) => {
+        impl $crate::internals::schemars::JsonSchema for $name {
+            fn schema_name() -> std::borrow::Cow<'static, str> {
+                stringify!($name).into()
+            }
+
+            fn json_schema(_: &mut $crate::internals::schemars::SchemaGenerator) -> $crate::internals::schemars::Schema {
+                $crate::internals::schemars::json_schema!({ "enum": Self::ALL.map(Self::as_str) })
+            }
+        }
+    };
+}
+
+#[doc(hidden)]
+#[macro_export]
+#[cfg(not(feature = "schema"))]
+macro_rules! named_in_schemas {
+    ($name:ident) => {};
+}

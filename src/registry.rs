@@ -227,13 +227,11 @@ impl Registry {
     }
 
     /// Returns the SIMD level of the built-in algorithms.
-    #[cfg(feature = "this-machine")]
     pub(crate) fn simd(&self) -> SimdLevel {
         self.simd
     }
 
     /// Returns the kind of helper threads, in a word.
-    #[cfg(feature = "this-machine")]
     pub(crate) fn helpers(&self) -> &'static str {
         self.threads.kind()
     }

@@ -1,11 +1,9 @@
 //! The splitmix64 generator, for fingerprints, seeds and draws.
 
 /// Increment of the state: 2^64 over the golden ratio.
-#[cfg(any(test, feature = "measure"))]
 const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// Advances the state and returns the next number (Steele, Lea and Flood, 2014).
-#[cfg(any(test, feature = "measure"))]
 pub(crate) fn next(state: &mut u64) -> u64 {
     *state = state.wrapping_add(STEP);
     mix(*state)

@@ -4,19 +4,22 @@ pub(crate) mod belief;
 mod corrected;
 mod crossover;
 mod error;
-#[cfg(feature = "model")]
+#[cfg(feature = "serde")]
 mod file;
 mod slice;
 
 use crate::cost::Frame;
-use crate::named::named;
-use crate::{AlgorithmId, CostCurve, Load, Registry, Residual};
+use crate::named;
+use crate::algorithm::{AlgorithmId, Load};
+use crate::cost::Residual;
+use crate::registry::Registry;
 use slice::Slice;
 use std::sync::Arc;
 
-pub use corrected::corrected;
+pub use crate::cost::{CostCurve, CostTerm, Product, Term};
+pub(crate) use corrected::corrected;
 pub use crossover::Crossover;
-pub use error::TuningError;
+pub(crate) use error::TuningError;
 
 /// [`Tuning::usual`] runs `k` threads from this times `k`² objects. A frame of `n` objects on `k` threads takes `a n
 /// / k + b k`, where `b` wakes one thread and waits for it. So `k` threads beat half as many from `n = (b / 2a) k²`
@@ -32,7 +35,7 @@ const MOST_USUAL_THREADS: u32 = 16;
 /// `steps`, as in the paper.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(
-    feature = "model",
+    feature = "serde",
     derive(serde::Serialize, serde::Deserialize),
     serde(try_from = "file::TuningFile", into = "file::TuningFile")
 )]
@@ -78,7 +81,7 @@ named! {
 
 /// From this many objects up, this algorithm.
 #[derive(Debug, Clone, PartialEq, Eq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub struct Step {
     /// First number of objects.

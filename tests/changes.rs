@@ -4,10 +4,9 @@ mod common;
 
 use common::{Random, every_algorithm, naive};
 use proptest::prelude::*;
-use sapwise::{
-    Aabb, Adaptive, AlgorithmId, BroadPhase, Changes, Error, Filter, Membership, Pair, PairOrder, Pairs, Registry,
-    Step, Tuning,
-};
+use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Changes, Error, Filter, Membership, PairOrder, Pairs, Registry, Tuning};
+use sapwise::internals::Pair;
+use sapwise::tuning::Step;
 use std::collections::BTreeSet;
 
 /// Boxes with ids. Some are added, some removed, and all move.

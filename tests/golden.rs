@@ -8,7 +8,9 @@
 mod common;
 
 use common::{every_algorithm, naive};
-use sapwise::{Aabb, BroadPhase, Pair, PairOrder, Pairs, SimdLevel};
+use sapwise::{Aabb, BroadPhase, PairOrder, Pairs};
+use sapwise::algorithm::SimdLevel;
+use sapwise::internals::Pair;
 use sapwise_scenes::Scenario;
 use std::fmt::Write;
 
@@ -132,14 +134,4 @@ fn every_algorithm_finds_the_golden_pairs() {
     let few = few.filter(|(id, _)| id.contains("@cpu1 ") || id.ends_with(&format!("@cpu7 at {fastest}")));
     assert_golden(SMALL, few.collect());
     assert_golden(LARGE, every_algorithm());
-}
-
-#[cfg(feature = "gpu")]
-#[test]
-fn every_gpu_finds_the_golden_pairs() {
-    let Some(gpus) = common::gpus() else { return };
-    let mut registry = sapwise::Registry::with_cores(1);
-    registry.add_gpus(&gpus);
-    let ids = registry.available().into_iter().map(|e| e.id).filter(|id| id.to_string().contains("@gpu"));
-    assert_golden(FEW, ids.map(|id| (id.to_string(), registry.create(&id).unwrap())).collect());
 }

@@ -2,10 +2,9 @@
 //!
 //! One test only, because the counter sees every thread of the process.
 
-use sapwise::{
-    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, Changes, CostCurve, CostTerm, Error, Filter, Load,
-    Membership, PairOrder, Pairs, Registry, Source, Term, Tuning,
-};
+use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Changes, Error, Filter, Membership, PairOrder, Pairs, Registry, Tuning};
+use sapwise::algorithm::Load;
+use sapwise::tuning::{AlgorithmCost, CostCurve, CostTerm, Source, Term};
 use sapwise_scenes::Scenario;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Arc;

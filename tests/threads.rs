@@ -1,6 +1,8 @@
 //! The types that threads may share, and the pinning of helper threads.
 
-use sapwise::{Adaptive, BroadPhase, Changes, Error, Load, Model, Pairs, Registry, Tuning};
+use sapwise::{Adaptive, BroadPhase, Changes, Error, Pairs, Registry, Tuning};
+use sapwise::algorithm::Load;
+use sapwise_tune::Model;
 
 #[test]
 fn public_types_are_send_and_sync() {
@@ -36,7 +38,8 @@ fn pool_threads() -> (usize, usize) {
 #[cfg(all(feature = "parallel", target_os = "linux"))]
 #[test]
 fn no_thread_is_pinned_unless_asked() {
-    use sapwise::{Aabb, usable_cores};
+    use sapwise::Aabb;
+    use sapwise::algorithm::usable_cores;
     if usable_cores() < 2 {
         // Every thread runs on the one CPU.
         return;

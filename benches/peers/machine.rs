@@ -2,9 +2,11 @@
 
 use crate::settings::Settings;
 use rayon::ThreadPool;
-use sapwise::hardware::ParameterId;
-use sapwise::measure::{self, Options};
-use sapwise::{Hardware, Model, Registry, Source, Tuning};
+use sapwise::{Registry, Tuning};
+use sapwise::tuning::Source;
+use sapwise_tune::{Hardware, Model};
+use sapwise_tune::hardware::ParameterId;
+use sapwise_tune::measure::{self, Options};
 use std::process::Command;
 use std::sync::Arc;
 

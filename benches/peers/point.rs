@@ -1,7 +1,7 @@
 //! What was measured of one scenario at one size.
 
 use crate::contestants::Side;
-use sapwise::stats::quantile;
+use sapwise::internals::stats::quantile;
 use sapwise_scenes::Scenario;
 
 /// How a contestant did.

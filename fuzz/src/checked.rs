@@ -3,7 +3,9 @@
 use crate::oracle::Answer;
 use crate::scene::Scene;
 use crate::source::Source;
-use sapwise::{Adaptive, AlgorithmId, BroadPhase, Hardware, Model, Pairs, Registry, SimdLevel, Tuning};
+use sapwise::{Adaptive, AlgorithmId, BroadPhase, Pairs, Registry, Tuning};
+use sapwise::algorithm::SimdLevel;
+use sapwise_tune::{Hardware, Model};
 use std::sync::LazyLock;
 
 /// Threads of the widest algorithm.

@@ -1,6 +1,8 @@
 //! Answers by definition.
 
-use sapwise::{Aabb, BoxDefect, Error, Membership, Pair};
+use sapwise::{Aabb, Error, Membership};
+use sapwise::error::BoxDefect;
+use sapwise::internals::Pair;
 use std::collections::BTreeSet;
 
 /// The answer that every algorithm must give.

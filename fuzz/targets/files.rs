@@ -3,7 +3,8 @@
 #![no_main]
 
 use libfuzzer_sys::{fuzz_mutator, fuzz_target, fuzzer_mutate};
-use sapwise::{Adaptive, BroadPhase, Error, Hardware, Model, Registry, Tuning, json};
+use sapwise::{Adaptive, BroadPhase, Error, Registry, Tuning};
+use sapwise_tune::{Hardware, Model, json};
 use sapwise_fuzz::checked::{check, hardware};
 use sapwise_fuzz::oracle::Answer;
 use sapwise_fuzz::scene::Scene;

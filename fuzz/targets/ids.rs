@@ -3,7 +3,9 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use sapwise::{AlgorithmId, Backend, ParameterId, Registry, SimdLevel, json};
+use sapwise::{AlgorithmId, Registry};
+use sapwise::algorithm::{Backend, SimdLevel};
+use sapwise_tune::{ParameterId, json};
 use sapwise_scenes::Scenario;
 use std::fmt::Display;
 use std::str::FromStr;

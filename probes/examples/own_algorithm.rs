@@ -10,8 +10,9 @@
 //!
 //! The manifest of a program outside this repository needs `sapwise` and `sapwise-cli`.
 
-use sapwise::model::Scale;
-use sapwise::{Aabb, BroadPhase, Error, Pairs, Product, Term};
+use sapwise::{Aabb, BroadPhase, Error, Pairs};
+use sapwise::tuning::{Product, Term};
+use sapwise_tune::model::Scale;
 use sapwise_cli::{Command, UserAlgorithm};
 use std::process::ExitCode;
 

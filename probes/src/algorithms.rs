@@ -1,8 +1,10 @@
 //! The algorithms of the command: those of the library, and those that a user's program adds.
 
 use crate::revisions;
-use sapwise::model::Scale;
-use sapwise::{AlgorithmId, Backend, BackendClass, BroadPhase, Error, Registry, Term};
+use sapwise::{AlgorithmId, BroadPhase, Error, Registry};
+use sapwise::algorithm::{Backend, BackendClass};
+use sapwise::tuning::Term;
+use sapwise_tune::model::Scale;
 use std::sync::Arc;
 
 /// Creates an instance of a user's algorithm on a number of threads.
@@ -13,7 +15,7 @@ type Factory = Arc<dyn Fn(u32) -> Result<Box<dyn BroadPhase>, Error> + Send + Sy
 /// `method` is 1 to 32 of `a-z`, `0-9`, `-` and `_`, begins with a letter, and is no name of the library's. Increase
 /// `revision` whenever the speed changes: reports and models of other revisions are stale then. Each process that runs
 /// the algorithm calls the factory; an error leaves the algorithm out with a remark. An algorithm with kernels of
-/// several vector widths should ask [`SimdLevel::in_use`](sapwise::SimdLevel::in_use), so that `SAPWISE_SIMD` restricts
+/// several vector widths should ask [`SimdLevel::in_use`](sapwise::algorithm::SimdLevel::in_use), so that `SAPWISE_SIMD` restricts
 /// it too.
 #[derive(Clone)]
 pub struct UserAlgorithm {

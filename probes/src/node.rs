@@ -1,7 +1,8 @@
 //! The file name of this node's report, which holds a hash instead of the host's name.
 
 use crate::profiles::machine_stem;
-use sapwise::{measure, usable_cores};
+use sapwise::algorithm::usable_cores;
+use sapwise_tune::measure;
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 

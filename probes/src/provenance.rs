@@ -4,8 +4,9 @@ use crate::algorithms::Algorithms;
 use crate::args::Probe;
 use crate::date;
 use crate::gpus::uses;
-use sapwise::stats::median;
-use sapwise::{Entry, GpuKind, Hardware, SimdLevel, usable_cores};
+use sapwise::algorithm::{Entry, SimdLevel, usable_cores};
+use sapwise::internals::stats::median;
+use sapwise_tune::{GpuKind, Hardware};
 use sapwise_lab::report::{Label, Point, Provenance, Restricted, Restriction, Timed, TimedTerm};
 use std::time::Duration;
 
@@ -77,7 +78,7 @@ pub(crate) fn timed(
 ) -> Vec<Timed> {
     let registry = algorithms.registry(threads.unwrap_or_else(usable_cores));
     let raced = |id| points.iter().any(|p| p.timings.iter().any(|t| t.algorithm == id));
-    let on_gpus = sapwise::gpu::algorithms(hardware.gpus.iter().map(|g| &g.gpu));
+    let on_gpus = sapwise_gpu::algorithms(hardware.gpus.iter().map(|g| &g.gpu));
     let entries = registry.available().into_iter().chain(on_gpus);
     let timed = |Entry { id, revision, .. }: Entry| {
         let terms = algorithms.terms(&id).iter().map(|&(term, scale)| TimedTerm { term, scale }).collect();
@@ -120,7 +121,8 @@ mod tests {
     use super::*;
     use crate::args::{Arguments, Verb};
     use clap::Parser;
-    use sapwise::{GpuHardware, GpuIdentity, Load, Machine};
+    use sapwise::algorithm::Load;
+    use sapwise_tune::{GpuHardware, GpuIdentity, Machine};
     use sapwise_lab::report::Timing;
 
     fn probe(words: &[&str]) -> Probe {

@@ -1,6 +1,8 @@
 //! Whether what a file says about algorithms holds for this build.
 
-use sapwise::{AlgorithmId, BackendClass, GpuIdentity, GpuKind, Model, Registry, Tuning};
+use sapwise::{AlgorithmId, Registry, Tuning};
+use sapwise::algorithm::BackendClass;
+use sapwise_tune::{GpuIdentity, GpuKind, Model};
 use sapwise_lab::Report;
 
 /// Returns why the timings of a report do not hold for this build, one sentence for each method.
@@ -37,7 +39,7 @@ fn name((class, method): Key<'_>) -> String {
 /// Returns the methods whose revision is not that of this build, one sentence for each.
 pub(crate) fn stale<'a>(used: impl Iterator<Item = (Key<'a>, u32)>, registry: &Registry) -> Vec<String> {
     // A revision on GPUs is the same on every GPU, and known without any.
-    let on_gpus = sapwise::gpu::algorithms(std::iter::once(&any_gpu()));
+    let on_gpus = sapwise_gpu::algorithms(std::iter::once(&any_gpu()));
     let mut stale = Vec::new();
     for ((class, method), revision) in used {
         let name = name((class, method));
@@ -57,7 +59,7 @@ pub(crate) fn stale<'a>(used: impl Iterator<Item = (Key<'a>, u32)>, registry: &R
 
 /// Returns whether this build has a method on that class of processor.
 pub(crate) fn is_known(key: Key<'_>, registry: &Registry) -> bool {
-    let on_gpus = sapwise::gpu::algorithms(std::iter::once(&any_gpu()));
+    let on_gpus = sapwise_gpu::algorithms(std::iter::once(&any_gpu()));
     registry.entries().iter().any(|e| of(&e.id) == key) || on_gpus.iter().any(|e| of(&e.id) == key)
 }
 
@@ -73,7 +75,7 @@ mod tests {
     #[test]
     fn revisions_count_on_cpu_and_gpu_apart_and_without_any_gpu() {
         let registry = Registry::with_cores(1);
-        let on_gpu = sapwise::gpu::algorithms(std::iter::once(&any_gpu()))[0].revision;
+        let on_gpu = sapwise_gpu::algorithms(std::iter::once(&any_gpu()))[0].revision;
         let key = |class| (class, "brute");
         assert_eq!(stale(std::iter::once((key(BackendClass::Gpu), on_gpu)), &registry), Vec::<String>::new());
         let told = stale(std::iter::once((key(BackendClass::Gpu), 999)), &registry);

@@ -77,13 +77,13 @@ fn each_kind_of_machine_gets_a_tuning_by_its_identity() {
     let first = fs::read_to_string(reports.path().join("first.json")).unwrap();
     let first = sapwise_lab::report::read(&first).unwrap().value;
     let own = out.join(first.hardware.machine.tuning_file(2, &[]));
-    let tuning = sapwise::json::tuning(&fs::read_to_string(&own).unwrap()).unwrap();
-    assert_eq!(tuning.source, sapwise::Source::Predicted);
+    let tuning = sapwise_tune::json::tuning(&fs::read_to_string(&own).unwrap()).unwrap();
+    assert_eq!(tuning.source, sapwise::tuning::Source::Predicted);
     assert_eq!(fs::read_dir(&out).unwrap().count(), 2);
     fs::remove_file(reports.path().join("shared.json")).unwrap();
     success(predict(&["--measured", "--out"]).arg(&out));
-    let tuning = sapwise::json::tuning(&fs::read_to_string(&own).unwrap()).unwrap();
-    assert_eq!(tuning.source, sapwise::Source::Measured);
+    let tuning = sapwise_tune::json::tuning(&fs::read_to_string(&own).unwrap()).unwrap();
+    assert_eq!(tuning.source, sapwise::tuning::Source::Measured);
     let complaint = failure(&mut predict(&[]), 2);
     assert!(complaint.contains("--out"), "{complaint}");
     let complaint = failure(predict(&["--out"]).arg(reports.path()), 2);

@@ -29,11 +29,11 @@ fn made_up(folder: &Path, name: &str, change: impl Fn(&mut Value)) -> PathBuf {
     report["label"] = "real_full".into();
     // The fixture is old; this is a report of this build.
     let registry = sapwise::Registry::with_cores(1);
-    let any = sapwise::GpuIdentity::new(0, "any", sapwise::GpuKind::Discrete);
-    let of_this_build = [registry.entries(), &sapwise::gpu::algorithms([&any])].concat();
+    let any = sapwise_tune::GpuIdentity::new(0, "any", sapwise_tune::GpuKind::Discrete);
+    let of_this_build = [registry.entries(), &sapwise_gpu::algorithms([&any])].concat();
     for algorithm in report["algorithms"].as_array_mut().unwrap() {
         let id: sapwise::AlgorithmId = algorithm["id"].as_str().unwrap().parse().unwrap();
-        let same = |e: &&sapwise::Entry| e.id.method() == id.method() && e.id.backend().class() == id.backend().class();
+        let same = |e: &&sapwise::algorithm::Entry| e.id.method() == id.method() && e.id.backend().class() == id.backend().class();
         if let Some(revision) = of_this_build.iter().find(same).map(|e| e.revision) {
             algorithm["revision"] = revision.into();
         }
@@ -87,11 +87,11 @@ fn software_adapters_are_measured_only_when_asked_for() {
     assert!(asked.provenance.command.contains("--software-gpus"));
     for gpu in &asked.hardware.gpus {
         let names: Vec<&str> = gpu.parameters.iter().map(|p| p.name.as_str()).collect();
-        assert_eq!(names, sapwise::hardware::GpuParameterId::OF_ONE);
+        assert_eq!(names, sapwise_tune::hardware::GpuParameterId::OF_ONE);
     }
     for group in &asked.hardware.gpu_groups {
         let names: Vec<&str> = group.parameters.iter().map(|p| p.name.as_str()).collect();
-        assert_eq!(names, sapwise::hardware::GpuParameterId::GROUP);
+        assert_eq!(names, sapwise_tune::hardware::GpuParameterId::GROUP);
     }
     for algorithm in devices["algorithms"].as_array().unwrap().iter().filter(|a| a["available"] == true) {
         let timed = asked.algorithms.iter().any(|t| t.id.to_string() == algorithm["id"].as_str().unwrap());
@@ -111,7 +111,7 @@ fn a_gpu_is_taken_by_its_number_and_one_that_is_not_there_is_wrong_usage() {
     let last = devices["adapters"].as_array().unwrap().last().unwrap()["index"].as_u64().unwrap() as u32;
     let one = report(sapwise().args(TINY).args(["--gpu", &last.to_string()]));
     assert_eq!(one.hardware.gpus.iter().map(|g| g.gpu.index).collect::<Vec<_>>(), [last], "{:?}", one.remarks);
-    let others = |id: &sapwise::AlgorithmId| matches!(id.backend(), sapwise::Backend::Gpu(list) if list[..] != [last]);
+    let others = |id: &sapwise::AlgorithmId| matches!(id.backend(), sapwise::algorithm::Backend::Gpu(list) if list[..] != [last]);
     assert!(!one.algorithms.iter().any(|t| others(&t.id)), "{:?}", one.algorithms);
 }
 

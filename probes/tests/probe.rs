@@ -5,7 +5,7 @@ mod common;
 #[cfg(all(unix, feature = "long-tests"))]
 use common::{TERMINATED, send};
 use common::{failure, sapwise, success};
-use sapwise::ParameterId;
+use sapwise_tune::ParameterId;
 use sapwise_lab::report::Report;
 use std::fs;
 use std::path::Path;

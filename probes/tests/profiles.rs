@@ -19,7 +19,7 @@ fn a_dry_run_lists_the_profiles_and_leaves_no_trace() {
     let out = folder.path().join("reports");
     let text = success(tiny(&out).arg("--dry-run"));
     assert!(text.contains("\nfull ") && text.contains("\nfull-again ") && text.contains("at most"), "{text}");
-    let several = sapwise::usable_cores() > 1;
+    let several = sapwise::algorithm::usable_cores() > 1;
     assert_eq!((text.contains("\n1t "), text.contains("\n1t-again ")), (several, several), "{text}");
     assert!(!out.exists());
 }
@@ -76,7 +76,7 @@ fn after_an_interrupt_the_same_command_continues() {
     assert!(!success(tiny(folder.path()).arg("--dry-run")).contains("complete"));
     label("real_full");
     let before = fs::read(&full).unwrap();
-    let lower = sapwise::SimdLevel::ALL.into_iter().rev().find(|&l| l < sapwise::SimdLevel::detected());
+    let lower = sapwise::algorithm::SimdLevel::ALL.into_iter().rev().find(|&l| l < sapwise::algorithm::SimdLevel::detected());
     let second = lower.map_or("full-again".to_owned(), |level| level.to_string());
     until(&format!("{second}.json"));
     assert_eq!(fs::read(&full).unwrap(), before, "a complete report was replaced");

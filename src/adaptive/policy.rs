@@ -106,7 +106,6 @@ impl Policy {
     }
 
     /// Learns and explores if that one does.
-    #[cfg(feature = "this-machine")]
     pub(super) fn set_as(&mut self, other: &Self) {
         (self.learns, self.explores) = (other.learns, other.explores);
     }

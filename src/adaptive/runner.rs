@@ -77,19 +77,16 @@ impl Runner {
     }
 
     /// Whether another tuning may [take the place](Self::replace) of this one before any frame.
-    #[cfg(feature = "this-machine")]
     pub(super) fn set_awaits(&mut self, awaits: bool) {
         self.awaits = awaits;
     }
 
     /// Whether another tuning may come before the next frame.
-    #[cfg(feature = "this-machine")]
     pub(super) fn is_open(&self) -> bool {
         self.awaits && self.decided.is_none()
     }
 
     /// Goes on with another tuning and its algorithms. The estimate of the load stays.
-    #[cfg(feature = "this-machine")]
     pub(super) fn replace(&mut self, tuning: Tuning, made: Instances) {
         self.catch_up();
         let before = std::mem::replace(&mut self.policy, policy(tuning, &made));

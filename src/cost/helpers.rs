@@ -5,7 +5,7 @@
 /// The caller begins while its helpers wake. A helper that wakes too late finds nothing left: the frame then takes the time of one
 /// thread, plus the time to call the helpers.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct Helpers {

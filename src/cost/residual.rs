@@ -24,7 +24,7 @@ const EXPONENT_LOG2: u32 = 4;
 /// Loads at which the residuals of all methods of a machine or a model are known.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(
-    feature = "model",
+    feature = "serde",
     derive(serde::Serialize, serde::Deserialize),
     serde(from = "Vec<Load>", into = "Vec<Load>")
 )]
@@ -131,14 +131,14 @@ impl Places {
     }
 }
 
-#[cfg(feature = "model")]
+#[cfg(feature = "serde")]
 impl From<Vec<Load>> for Places {
     fn from(loads: Vec<Load>) -> Self {
         Self::new(loads)
     }
 }
 
-#[cfg(feature = "model")]
+#[cfg(feature = "serde")]
 impl From<Places> for Vec<Load> {
     fn from(places: Places) -> Self {
         places.loads

@@ -4,7 +4,7 @@ use crate::Load;
 
 /// A count of operations that grows with the load in its own way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub enum Term {
@@ -35,27 +35,27 @@ pub enum Term {
 ///
 /// No power is negative, so that no count falls when a value rises. Together they are at most [`Product::MOST_POWERS`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct Product {
     /// Power of the number of objects, n.
-    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "is_zero"))]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_zero"))]
     pub objects: u8,
     /// Power of its base-2 logarithm, 0 for no object.
-    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "is_zero"))]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_zero"))]
     pub log2_objects: u8,
     /// Power of [`Load::pairs`].
-    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "is_zero"))]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_zero"))]
     pub pairs: u8,
     /// Power of [`Load::axis_candidates`].
-    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "is_zero"))]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_zero"))]
     pub axis_candidates: u8,
     /// Power of [`Load::strip_candidates`].
-    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "is_zero"))]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_zero"))]
     pub strip_candidates: u8,
     /// Power of [`Load::moved`], which is 0 to 1.
-    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "is_zero"))]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_zero"))]
     pub moved: u8,
 }
 
@@ -125,7 +125,7 @@ impl Product {
 }
 
 /// Whether a file leaves this power out.
-#[cfg(feature = "model")]
+#[cfg(feature = "serde")]
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
 fn is_zero(power: &u8) -> bool {
     *power == 0

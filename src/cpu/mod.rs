@@ -19,12 +19,10 @@ mod threads;
 mod tree;
 mod workers;
 
-#[cfg(feature = "measure")]
 pub(crate) use helpers::pinned_pool;
 pub(crate) use level::Simd;
 pub use level::{SimdLevel, SimdLevelError};
 pub(crate) use threads::Threads;
-#[cfg(any(feature = "gpu", feature = "measure"))]
 pub(crate) use workers::Workers;
 
 use crate::broad_phase::BroadPhase;

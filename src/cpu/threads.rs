@@ -25,7 +25,6 @@ pub(crate) struct Threads {
 
 impl Threads {
     /// Makes pools whose threads are pinned.
-    #[cfg(feature = "measure")]
     pub(crate) fn pinned() -> Self {
         Self { pinned: true, ..Self::default() }
     }
@@ -38,7 +37,6 @@ impl Threads {
     }
 
     /// Returns what these threads are: `pinned`, `free`, or `given` by the program.
-    #[cfg(feature = "this-machine")]
     pub(crate) fn kind(&self) -> &'static str {
         match (&self.given, self.pinned && crate::cpu::placement::may_pin()) {
             (Some(_), _) => "given",

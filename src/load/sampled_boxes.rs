@@ -49,7 +49,6 @@ impl SampledBoxes {
     }
 
     /// Takes the first 256 of boxes that were sampled elsewhere.
-    #[cfg(feature = "gpu")]
     pub(crate) fn given(boxes: &[Aabb]) -> Self {
         let mut sample = Self { boxes: [Aabb::default(); MOST], count: 0 };
         for b in boxes.iter().filter(|b| b.defect().is_none()).take(MOST) {

@@ -78,7 +78,6 @@ impl StripGrid {
     }
 
     /// Returns the number of cells on the two grid axes.
-    #[cfg(feature = "gpu")]
     pub(crate) fn cells(&self) -> [u32; 2] {
         self.cells
     }

@@ -126,7 +126,6 @@ impl Pairs {
     }
 
     /// Appends the wanted ones of pairs that stand lower member first.
-    #[cfg(feature = "gpu")]
     pub(crate) fn extend(&mut self, pairs: &[[u32; 2]]) -> Result<(), Error> {
         if self.filter.is_none() {
             self.reserve(self.len + pairs.len())?;
@@ -165,7 +164,6 @@ impl Pairs {
     }
 
     /// Returns whether `more` pairs are surely too many: false if there is a filter, which may drop them.
-    #[cfg(feature = "gpu")]
     pub(crate) fn is_too_small_for(&self, more: u64) -> bool {
         self.filter.is_none() && self.limit.is_some_and(|limit| self.len as u64 + more > limit as u64)
     }

@@ -4,7 +4,7 @@ use crate::AlgorithmId;
 
 /// The number of objects at which two algorithms cost the same and their fields meet.
 #[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct Crossover {

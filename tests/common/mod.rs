@@ -1,10 +1,9 @@
 //! Shared by the test programs of the contract.
 #![allow(dead_code, reason = "each test program uses a part of this")]
 
-#[cfg(feature = "gpu")]
-pub(crate) mod gpu;
-
-use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Membership, Pair, Registry, SimdLevel};
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Membership, Registry};
+use sapwise::algorithm::SimdLevel;
+use sapwise::internals::Pair;
 
 /// The oracle: the definition of overlap, in a double loop.
 pub(crate) fn naive(boxes: &[Aabb]) -> Vec<Pair> {
@@ -140,17 +139,4 @@ pub(crate) fn large_boxes() -> Vec<Aabb> {
         boxes.insert(k * 97, Aabb::new(at, [at[0] + size[0], at[1] + size[1], at[2] + size[2]]));
     }
     boxes
-}
-
-/// Returns the GPUs of this machine. Prints a remark and returns `None` if there is none and none is required.
-#[cfg(feature = "gpu")]
-pub(crate) fn gpus() -> Option<sapwise::gpu::Gpus> {
-    let gpus = sapwise::gpu::Gpus::find();
-    if !gpus.is_empty() {
-        return Some(gpus);
-    }
-    let required = std::env::var_os("SAPWISE_REQUIRE_GPU").is_some_and(|v| v == "1");
-    assert!(!required, "SAPWISE_REQUIRE_GPU=1, and no GPU was found");
-    println!("skipped: no GPU was found");
-    None
 }

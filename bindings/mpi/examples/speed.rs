@@ -8,7 +8,8 @@
 use mpi::Threading;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Source};
-use sapwise::{Aabb, Adaptive, BroadPhase, Pairs, Registry, SimdLevel, Tuning};
+use sapwise::{Aabb, Adaptive, BroadPhase, Pairs, Registry, Tuning};
+use sapwise::algorithm::SimdLevel;
 use sapwise_mpi::{Distributed, MpiExchange, RankPairs};
 use sapwise_ranks::Exchange;
 use sapwise_scenes::Scenario;
@@ -42,7 +43,7 @@ fn told(name: &str, values: &mut [f64]) {
 fn alone(world: &impl Communicator) {
     let registry = Registry::with_cores(1);
     let id = std::env::args().nth(2).unwrap_or("grid-sap@cpu1".to_owned()).parse().expect("no algorithm");
-    let steps = vec![sapwise::Step::new(0, id)];
+    let steps = vec![sapwise::tuning::Step::new(0, id)];
     let tuning = || Tuning::from_steps(steps.clone()).expect("one step is a tuning");
     let mut ranks = Distributed::new(world, &registry, tuning()).expect("no broad phase");
     let mut plain = Adaptive::new(tuning(), &registry).expect("no broad phase");
@@ -155,7 +156,7 @@ fn unequal(world: &impl Communicator) {
     let id = |threads: u32| format!("grid-sap@cpu{threads}").parse().expect("no algorithm");
     // Without costs in the tuning: the times of the first frames show the speed of each rank.
     let make = || {
-        let steps = vec![sapwise::Step::new(0, id(threads))];
+        let steps = vec![sapwise::tuning::Step::new(0, id(threads))];
         let exchange = Turns { exchange: MpiExchange::new(world), world: world.duplicate(), sent: 0, searching: false };
         let tuning = Tuning::from_steps(steps).expect("one step is a tuning");
         sapwise_ranks::Distributed::<Turns>::new(exchange, &registry, tuning).expect("no broad phase")

@@ -2,7 +2,8 @@
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use sapwise::{Decision, Load};
+use sapwise::Decision;
+use sapwise::algorithm::Load;
 
 /// What was decided for a frame, and why. ``str()`` of it is a sentence.
 ///

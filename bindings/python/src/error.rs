@@ -2,7 +2,8 @@
 
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
-use sapwise::{BoxDefect, Error};
+use sapwise::Error;
+use sapwise::error::BoxDefect;
 
 /// Makes an instance of a class of `sapwise._errors`.
 fn instance<'py>(py: Python<'py>, class: &str, arguments: impl pyo3::call::PyCallArgs<'py>) -> PyErr {

@@ -3,8 +3,8 @@
 use crate::error::failed;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use sapwise::ParameterId;
-use sapwise::measure::{Family, Options, family, machine};
+use sapwise_tune::ParameterId;
+use sapwise_tune::measure::{Family, Options, family, machine};
 use std::str::FromStr;
 use std::time::Duration;
 

@@ -1,6 +1,7 @@
 //! Rounds boxes of 64-bit floats to 32 bits.
 
-use sapwise::{Aabb, BoxDefect};
+use sapwise::Aabb;
+use sapwise::error::BoxDefect;
 
 /// Rounds each bound to the nearest 32-bit float. Rounding is monotonic: no pair is lost, and nearly touching boxes may
 /// gain one. Rounding outward would add more. Defects are checked before rounding, which may hide an inverted box.

@@ -7,10 +7,9 @@ use crate::start;
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::prelude::*;
-use sapwise::{
-    Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Filter, Membership, PairOrder, Pairs, Registry, StartOptions, Step,
-    Tuning,
-};
+use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Filter, Membership, PairOrder, Pairs, Registry, Tuning};
+use sapwise::tuning::Step;
+use sapwise_tune::StartOptions;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// The method that keeps work from frame to frame: of no use here.

@@ -2,7 +2,8 @@
 
 use crate::error::{exception, failed, unusable};
 use pyo3::prelude::*;
-use sapwise::{Adaptive, Error, PairOrder, Pairs, Registry, StartOptions, Tuning};
+use sapwise::{Adaptive, Error, PairOrder, Pairs, Registry, Tuning};
+use sapwise_tune::StartOptions;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -37,7 +38,7 @@ impl Start {
         let registry = self.registry();
         let mut adaptive = match (&self.algorithm, &self.tuning) {
             (Some(name), _) => {
-                let parsed = name.parse().map_err(|why: sapwise::ParseIdError| Error::UnknownAlgorithm {
+                let parsed = name.parse().map_err(|why: sapwise::error::ParseIdError| Error::UnknownAlgorithm {
                     text: name.clone(),
                     hint: format!("{why}; known here: {}", known(&registry)),
                 })?;

@@ -5,7 +5,9 @@ use crate::error::{failed, unusable, with_cause};
 use crate::start;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use sapwise::{Adaptive, Load, Setup, Tuning, json};
+use sapwise::{Adaptive, Tuning};
+use sapwise::algorithm::Load;
+use sapwise_tune::{Setup, json};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
@@ -190,7 +192,7 @@ impl PyTuning {
         if !load.is_sound() {
             return Err(unusable(py, format!("{load:?} is negative or not finite; give finite numbers, 0 or more")));
         }
-        let cost = |c: &sapwise::AlgorithmCost| (c.algorithm.to_string(), c.curve.cost_ns(&load));
+        let cost = |c: &sapwise::tuning::AlgorithmCost| (c.algorithm.to_string(), c.curve.cost_ns(&load));
         let mut costs: Vec<(String, f64)> = self.tuning.costs.iter().map(cost).collect();
         costs.sort_by(|a, b| a.1.total_cmp(&b.1));
         let dict = PyDict::new(py);

@@ -2,8 +2,9 @@
 
 use crate::data::host;
 use crate::report::{Label, Report};
-use sapwise::stats::{median, quantile};
-use sapwise::{AlgorithmId, ParameterId};
+use sapwise::AlgorithmId;
+use sapwise::internals::stats::{median, quantile};
+use sapwise_tune::ParameterId;
 use serde::Serialize;
 use std::collections::BTreeMap;
 

@@ -3,9 +3,10 @@
 use crate::label_text::kind;
 use crate::text::count;
 use crate::{Regrets, Split, Training, Validation};
-use sapwise::hardware::with_unit;
-use sapwise::model::MethodModel;
-use sapwise::{BackendClass, Model};
+use sapwise::algorithm::BackendClass;
+use sapwise_tune::Model;
+use sapwise_tune::hardware::with_unit;
+use sapwise_tune::model::MethodModel;
 use std::collections::BTreeMap;
 
 /// Method and use, the same for every model.

@@ -2,7 +2,7 @@
 
 use crate::report::{self, Report};
 use crate::training::Training;
-use sapwise::json::{self, Error};
+use sapwise_tune::json::{self, Error};
 use serde_json::Value;
 
 /// Returns the file names and texts of the JSON Schemas of tunings, models with their training, and reports.

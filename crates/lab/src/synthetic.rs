@@ -3,10 +3,12 @@
 
 use crate::fit::components;
 use crate::report::{Label, Point, Provenance, Report, Timed, Timing};
-use sapwise::hardware::GpuParameterId;
-use sapwise::hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, ParameterId};
-use sapwise::model::{FallbackModel, HelpersModel, MethodModel, ModelTerm, Scale};
-use sapwise::{AlgorithmCost, AlgorithmId, BackendClass, Entry, Hardware, Load, Model, Parameter, Term};
+use sapwise::AlgorithmId;
+use sapwise::algorithm::{BackendClass, Entry, Load};
+use sapwise::tuning::{AlgorithmCost, Term};
+use sapwise_tune::{GpuIdentity, GpuKind, Hardware, Model, Parameter};
+use sapwise_tune::hardware::{GpuGroup, GpuHardware, GpuParameterId, ParameterId};
+use sapwise_tune::model::{FallbackModel, HelpersModel, MethodModel, ModelTerm, Scale};
 use sapwise_scenes::Random;
 
 /// A machine of the made-up family.
@@ -125,7 +127,7 @@ impl Machine {
         let together = [(GpuParameterId::GroupUploadRatio, 1.4), (GpuParameterId::GroupRoundTripRatio, 1.2)];
         let group = GpuGroup::new((0..gpus.len() as u32).collect(), together.map(measured).into());
         let gpu_groups = if gpus.len() > 1 { vec![group] } else { Vec::new() };
-        let hardware = Hardware::new(sapwise::Machine::of(self.name), parameters.into());
+        let hardware = Hardware::new(sapwise_tune::Machine::of(self.name), parameters.into());
         hardware.with_gpus(gpus).with_gpu_groups(gpu_groups)
     }
 

@@ -7,7 +7,7 @@ use crate::progress::Progress;
 use crate::report::Label;
 use crate::training::{Training, TrainingCount, TrainingReport};
 use anyhow::{Result, bail};
-use sapwise::Model;
+use sapwise_tune::Model;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Most reports that a training lists; it counts more. One takes 130 bytes, and the built-in model is part of the library.
@@ -94,8 +94,8 @@ mod tests {
     use crate::report::Report;
     use crate::synthetic::{Machine, truth};
     use crate::training::{read_model, write_model};
-    use sapwise::Entry;
-    use sapwise::hardware::ParameterId;
+    use sapwise::algorithm::Entry;
+    use sapwise_tune::hardware::ParameterId;
 
     fn reports() -> Vec<(String, Report)> {
         Machine::family().iter().map(|m| (format!("{}.json", m.name), m.report())).collect()
@@ -161,8 +161,10 @@ mod tests {
     #[test]
     fn a_users_tree_is_fitted_with_the_terms_that_its_reports_name() {
         use crate::report::{Timed, TimedTerm, Timing};
-        use sapwise::model::Scale;
-        use sapwise::{AlgorithmId, Load, Term};
+        use sapwise::AlgorithmId;
+        use sapwise::algorithm::Load;
+        use sapwise::tuning::Term;
+        use sapwise_tune::model::Scale;
         let id: AlgorithmId = "my-tree@cpu1".parse().unwrap();
         // A sort of all boxes and nothing else: the usual terms of an unknown method hold it too, beside ten others.
         let named = TimedTerm { term: Term::Sort, scale: Scale::Cycle };

@@ -1,8 +1,8 @@
 //! What a model was trained on, and how well models of its kind did on held-out machines.
 
 use crate::report::Label;
-use sapwise::Model;
-use sapwise::json::{self, Format};
+use sapwise_tune::Model;
+use sapwise_tune::json::{self, Format};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;

@@ -1,7 +1,9 @@
 //! Every report in the repository is sound and current, its label is true, and the built-in model predicts its machine.
 
-use sapwise::hardware::{GpuParameterId, ParameterId};
-use sapwise::{BackendClass, Entry, Hardware, Model, Registry};
+use sapwise::Registry;
+use sapwise::algorithm::{BackendClass, Entry};
+use sapwise_tune::{Hardware, Model};
+use sapwise_tune::hardware::{GpuParameterId, ParameterId};
 use sapwise_lab::data::{host, read_reports};
 use sapwise_lab::progress::Silent;
 use sapwise_lab::report::{self, Label, Report};

@@ -1,6 +1,6 @@
 //! The paper's three cards in `datasets/published/` hold what its Figure 9 prints.
 
-use sapwise::hardware::{GpuParameterId, How, ParameterId};
+use sapwise_tune::hardware::{GpuParameterId, How, ParameterId};
 use sapwise_lab::report::{self, Label, Report};
 use std::path::Path;
 

@@ -1,6 +1,6 @@
 //! Why ranks find no pairs.
 
-use sapwise::BoxDefect;
+use sapwise::error::BoxDefect;
 
 /// Why no rank has pairs of this frame, the same on all ranks. The next frame starts from scratch.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -1,7 +1,7 @@
 //! The record that every rank sends to every other at the beginning of a frame.
 
 use crate::error::Error;
-use sapwise::BoxDefect;
+use sapwise::error::BoxDefect;
 
 /// Words of a record.
 pub(crate) const WORDS: usize = 8;

@@ -1,6 +1,7 @@
 //! Shares of the work, with which all ranks take the same time.
 
-use sapwise::{Load, Tuning};
+use sapwise::Tuning;
+use sapwise::algorithm::Load;
 
 /// The loads for which each rank predicts its time, as multiples of the mean load.
 pub const FACTORS: [f64; 9] = [0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];

@@ -4,10 +4,9 @@
 //! `tools/wasm.sh` builds it for wasm32-unknown-unknown and runs it in Node.js; `cargo run -p sapwise-example-wasm`
 //! runs it here.
 
-use sapwise::{
-    Aabb, Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Load, PairOrder, Pairs, Registry, Source, Term,
-    Tuning,
-};
+use sapwise::{Aabb, Adaptive, BroadPhase, PairOrder, Pairs, Registry, Tuning};
+use sapwise::algorithm::Load;
+use sapwise::tuning::{AlgorithmCost, CostCurve, CostTerm, Source, Term};
 
 /// The last frame has 1500 boxes.
 const FRAMES: usize = 60;

@@ -30,7 +30,7 @@ pub(crate) enum PartKind {
     /// Prints the parameters of several GPUs that work together, as JSON.
     GpuGroup {
         /// As in `gpu0+1`.
-        gpus: sapwise::Backend,
+        gpus: sapwise::algorithm::Backend,
         #[arg(long)]
         threads: Option<u32>,
     },

@@ -3,10 +3,11 @@
 use super::{Finding, Here, privacy};
 use crate::gpus::{difference, uses};
 use crate::{date, revisions};
-use sapwise::hardware::ParameterId;
-use sapwise::measure::Watch;
-use sapwise::stats::median;
-use sapwise::{GpuHardware, Hardware, SimdLevel};
+use sapwise::algorithm::SimdLevel;
+use sapwise::internals::stats::median;
+use sapwise_tune::{GpuHardware, Hardware};
+use sapwise_tune::hardware::ParameterId;
+use sapwise_tune::measure::Watch;
 use sapwise_lab::report::{Label, Point, Report};
 
 /// Several threads may be up to this factor faster than their number, by a clock that rises between two measurements.

@@ -2,7 +2,8 @@
 
 use super::{Finding, Here};
 use crate::revisions;
-use sapwise::{AlgorithmId, Backend, Tuning, usable_cores};
+use sapwise::{AlgorithmId, Tuning};
+use sapwise::algorithm::{Backend, usable_cores};
 
 impl Here {
     pub(super) fn tuning(&self, tuning: &Tuning, finding: &mut Finding) {

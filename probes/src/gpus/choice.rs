@@ -2,7 +2,9 @@
 
 use super::look::Seen;
 use crate::exit::WrongUsage;
-use sapwise::{AlgorithmId, Backend, GpuIdentity, GpuKind};
+use sapwise::AlgorithmId;
+use sapwise::algorithm::Backend;
+use sapwise_tune::{GpuIdentity, GpuKind};
 use sapwise_lab::report::Report;
 
 /// The options of verbs that take GPUs.

@@ -3,8 +3,9 @@
 use super::choice::uses;
 use super::parameters::inert;
 use crate::child::{Ended, run_part};
-use sapwise::gpu::{GpuErrorKind, Gpus};
-use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Pairs, Registry, Unavailable};
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Pairs, Registry};
+use sapwise::error::{GpuErrorKind, Unavailable};
+use sapwise_gpu::Gpus;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
@@ -29,8 +30,8 @@ pub(crate) struct OnGpus {
 pub(crate) fn print_entries() -> anyhow::Result<()> {
     let gpus = Gpus::find();
     let mut registry = Registry::with_cores(1);
-    registry.add_gpus(&gpus);
-    for id in sapwise::gpu::algorithms(gpus.identities()).into_iter().map(|e| e.id) {
+    sapwise_gpu::add_to(&mut registry, &gpus);
+    for id in sapwise_gpu::algorithms(gpus.identities()).into_iter().map(|e| e.id) {
         let error = registry.create(&id).and_then(|mut algorithm| try_out(algorithm.as_mut())).err();
         let gpu = match &error {
             Some(Error::Unavailable { reason: Unavailable::Gpu(why), .. }) if why.kind() == GpuErrorKind::Inert => gpus

@@ -1,8 +1,8 @@
 //! The search for GPUs.
 
 use crate::child::{Ended, run_part};
-use sapwise::GpuIdentity;
-use sapwise::gpu::Gpus;
+use sapwise_gpu::Gpus;
+use sapwise_tune::GpuIdentity;
 use std::time::Duration;
 
 /// Looking takes tens of milliseconds, and seconds when a driver compiles on its first start.

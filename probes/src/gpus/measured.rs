@@ -5,7 +5,7 @@ use super::look::look;
 use super::parameters::{group_without_parameters, inert, without_parameters};
 use crate::child::{Ended, run_part};
 use crate::progress::Progress;
-use sapwise::{GpuGroup, GpuHardware, GpuIdentity, GpuParameterId};
+use sapwise_tune::{GpuGroup, GpuHardware, GpuIdentity, GpuParameterId};
 use serde::de::DeserializeOwned;
 use std::time::Duration;
 
@@ -86,7 +86,7 @@ impl Measured {
 
     /// Measures every set of several GPUs that our algorithms run on.
     fn measure_groups(&mut self, threads: Option<u32>) -> anyhow::Result<()> {
-        let mut sets: Vec<Vec<u32>> = sapwise::gpu::algorithms(&self.usable)
+        let mut sets: Vec<Vec<u32>> = sapwise_gpu::algorithms(&self.usable)
             .iter()
             .map(|e| uses(&e.id).to_vec())
             .filter(|s| s.len() > 1)
@@ -96,7 +96,7 @@ impl Measured {
             if self.groups.iter().any(|g| g.gpus == set) {
                 continue;
             }
-            let text = sapwise::Backend::Gpu(set.clone()).to_string();
+            let text = sapwise::algorithm::Backend::Gpu(set.clone()).to_string();
             let group = part("gpu-group", &text, threads)?;
             self.groups.push(group.unwrap_or_else(|why| {
                 self.remarks.push(format!("{text} could not be measured together: {why}"));

@@ -1,9 +1,9 @@
 //! The output of the processes that look for GPUs and measure them.
 
 use anyhow::anyhow;
-use sapwise::gpu::Gpus;
-use sapwise::measure::Options;
-use sapwise::{GpuGroup, GpuHardware, GpuIdentity, GpuParameterId, Parameter};
+use sapwise_gpu::Gpus;
+use sapwise_tune::{GpuGroup, GpuHardware, GpuIdentity, GpuParameterId, Parameter};
+use sapwise_tune::measure::Options;
 
 /// Prints each GPU in a line.
 ///
@@ -21,7 +21,7 @@ pub(crate) fn print_parameters(index: u32, options: &Options) -> anyhow::Result<
     let gpus = Gpus::find();
     let identity =
         gpus.identities().find(|g| g.index == index).ok_or_else(|| anyhow!("there is no gpu{index} any more"))?;
-    let hardware = sapwise::measure::gpu(&gpus, index, options)
+    let hardware = sapwise_tune::measure::gpu(&gpus, index, options)
         .unwrap_or_else(|why| without_parameters(identity.clone(), &why.to_string()));
     crate::output::print_json(&hardware)
 }
@@ -32,7 +32,7 @@ pub(crate) fn print_parameters(index: u32, options: &Options) -> anyhow::Result<
 /// When standard output can't be written.
 pub(crate) fn print_group(indices: &[u32], options: &Options) -> anyhow::Result<()> {
     let gpus = Gpus::find();
-    let group = sapwise::measure::gpu_group(&gpus, indices, options)
+    let group = sapwise_tune::measure::gpu_group(&gpus, indices, options)
         .unwrap_or_else(|why| group_without_parameters(indices, &why.to_string()));
     crate::output::print_json(&group)
 }

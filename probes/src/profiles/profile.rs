@@ -4,7 +4,8 @@ use super::slug;
 use crate::args::Probe;
 use crate::gpus::GpuChoice;
 use crate::provenance;
-use sapwise::{GpuIdentity, GpuKind, SimdLevel};
+use sapwise::algorithm::SimdLevel;
+use sapwise_tune::{GpuIdentity, GpuKind};
 use sapwise_lab::sweep::Plan;
 use std::time::Duration;
 

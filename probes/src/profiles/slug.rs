@@ -1,6 +1,6 @@
 //! File names from the names of CPUs and GPUs.
 
-use sapwise::GpuIdentity;
+use sapwise_tune::GpuIdentity;
 
 /// Characters of a name at most.
 const LONGEST: usize = 48;
@@ -65,7 +65,7 @@ fn slug(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sapwise::GpuKind;
+    use sapwise_tune::GpuKind;
 
     #[test]
     fn cpus_have_short_names() {

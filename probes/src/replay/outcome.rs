@@ -1,8 +1,9 @@
 //! The outcome of a replay and the numbers that follow from it.
 
 use super::samples::{Samples, windows};
-use sapwise::stats::{median, quantile};
-use sapwise::{AlgorithmId, Load, Reason};
+use sapwise::{AlgorithmId, Reason};
+use sapwise::algorithm::Load;
+use sapwise::internals::stats::{median, quantile};
 use sapwise_lab::figures::Replay;
 use serde::Serialize;
 use std::ops::Range;

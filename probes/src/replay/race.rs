@@ -7,9 +7,9 @@ use super::samples::Samples;
 use crate::interrupt;
 use crate::progress::Progress;
 use anyhow::{Context, bail};
-use sapwise::measure::Watch;
-use sapwise::stats::median;
 use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Pairs, Reason, Registry, Tuning};
+use sapwise::internals::stats::median;
+use sapwise_tune::measure::Watch;
 use sapwise_scenes::Random;
 use std::time::Instant;
 

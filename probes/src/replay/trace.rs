@@ -2,7 +2,8 @@
 
 use super::outcome::Outcome;
 use crate::exit::WrongUsage;
-use sapwise::{Load, Reason};
+use sapwise::Reason;
+use sapwise::algorithm::Load;
 use sapwise_lab::write::write_atomically;
 use std::io::Write;
 use std::path::Path;

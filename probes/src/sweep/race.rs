@@ -5,8 +5,9 @@
 
 use super::contest::{Contest, FEW_FRAMES};
 use super::verify::Answer;
-use sapwise::measure::{Options, Watch, core_to_core_ns};
-use sapwise::{Aabb, AlgorithmId, BroadPhase, Displacement, Load, Pairs};
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Pairs};
+use sapwise::algorithm::{Displacement, Load};
+use sapwise_tune::measure::{Options, Watch, core_to_core_ns};
 use sapwise_lab::report::{Point, Timing};
 use sapwise_lab::sweep::{WARM_UP, next_frame};
 use sapwise_scenes::{Random, Scene};

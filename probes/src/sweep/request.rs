@@ -1,6 +1,7 @@
 //! The request to a sweeping process and its events.
 
-use sapwise::{AlgorithmId, GpuIdentity};
+use sapwise::AlgorithmId;
+use sapwise_tune::GpuIdentity;
 use sapwise_lab::report::Point;
 use serde::{Deserialize, Serialize};
 

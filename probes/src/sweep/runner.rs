@@ -6,7 +6,7 @@ use crate::child::{Ended, run_part};
 use crate::interrupt;
 use crate::progress::Progress;
 use anyhow::Context;
-use sapwise::GpuIdentity;
+use sapwise_tune::GpuIdentity;
 use sapwise_lab::report::Point;
 use sapwise_lab::sweep::Plan;
 use sapwise_scenes::Random;

@@ -3,8 +3,9 @@
 use super::race::{FEWEST_FRAMES, Race, Raced, Racer};
 use super::request::{Event, Schedule, SweepRequest, Visit};
 use crate::algorithms::Algorithms;
-use sapwise::gpu::Gpus;
-use sapwise::{AlgorithmId, GpuIdentity, Registry};
+use sapwise::{AlgorithmId, Registry};
+use sapwise_gpu::Gpus;
+use sapwise_tune::GpuIdentity;
 use sapwise_lab::report::Point;
 use sapwise_lab::sweep::{Standing, median, share};
 use sapwise_scenes::Scenario;
@@ -144,7 +145,7 @@ pub(crate) fn add_gpus(registry: &mut Registry, wanted: &[GpuIdentity]) -> Vec<S
     let gone = gone.into_iter().map(|g| {
         format!("gpu{} ({}) was there when the hardware was measured and is now gone; it is left out", g.index, g.name)
     });
-    registry.add_gpus(&gpus.choose(|g| there.contains(g)));
+    sapwise_gpu::add_to(registry, &gpus.choose(|g| there.contains(g)));
     gone.collect()
 }
 
@@ -267,7 +268,7 @@ mod tests {
 
     #[test]
     fn a_gpu_that_is_gone_is_a_remark_and_the_sweep_goes_on() {
-        let gone = GpuIdentity::new(99, "none such", sapwise::GpuKind::Discrete);
+        let gone = GpuIdentity::new(99, "none such", sapwise_tune::GpuKind::Discrete);
         let request = SweepRequest { gpus: vec![gone], ..request("uniform", &[10], 1.0) };
         let (mut points, mut remarks) = (0, Vec::new());
         sweep(&request, &Algorithms::default(), &mut |event| {

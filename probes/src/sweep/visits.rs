@@ -2,7 +2,7 @@
 
 use super::request::Visit;
 use sapwise::AlgorithmId;
-use sapwise::measure::Watch;
+use sapwise_tune::measure::Watch;
 use sapwise_lab::report::Point;
 use sapwise_lab::sweep::{WARM_UP, median};
 use std::collections::BTreeMap;
@@ -97,7 +97,7 @@ fn between(below: (&u32, &Size), above: (&u32, &Size), shortest: f64) -> Option<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sapwise::Load;
+    use sapwise::algorithm::Load;
     use sapwise_lab::report::Timing;
 
     /// Costs n^2 / 10 and 30 n, which cross at 300, and one that is far behind.

@@ -7,7 +7,9 @@ use crate::gpus::{self, Seen, look};
 use crate::output;
 use crate::progress::Progress;
 use crate::terminal::Terminal;
-use sapwise::{AlgorithmId, GpuIdentity, SimdLevel, usable_cores};
+use sapwise::AlgorithmId;
+use sapwise::algorithm::{SimdLevel, usable_cores};
+use sapwise_tune::GpuIdentity;
 use sapwise_lab::text::count;
 use serde::Serialize;
 
@@ -70,7 +72,7 @@ fn algorithms(seen: &Seen, known: &Algorithms) -> anyhow::Result<(Vec<Algorithm>
         .iter()
         .map(|e| algorithm(&e.id, e.revision, e.unavailable.as_ref().map(|why| format!("{why:#}"))))
         .collect();
-    for sapwise::Entry { id, revision, .. } in sapwise::gpu::algorithms(&seen.identities) {
+    for sapwise::algorithm::Entry { id, revision, .. } in sapwise_gpu::algorithms(&seen.identities) {
         list.push(algorithm(&id, revision, reason(&id)));
     }
     let mut inert: Vec<String> = Vec::new();

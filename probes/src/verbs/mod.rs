@@ -15,7 +15,7 @@ mod train;
 use crate::algorithms::Algorithms;
 use crate::args::Verb;
 use crate::exit::{Outcome, WrongUsage};
-use sapwise::SimdLevel;
+use sapwise::algorithm::SimdLevel;
 
 /// Runs a verb to its end.
 ///

@@ -6,7 +6,9 @@ use crate::exit::{Outcome, WrongUsage};
 use crate::progress::Progress;
 use crate::{gpus, interrupt, output, outputs, shell};
 use anyhow::Context;
-use sapwise::{AlgorithmId, BroadPhase, Pairs, Registry, Unavailable, usable_cores};
+use sapwise::{AlgorithmId, BroadPhase, Pairs, Registry};
+use sapwise::algorithm::usable_cores;
+use sapwise::error::Unavailable;
 use sapwise_lab::sweep::median;
 use sapwise_lab::text::{count, duration, grouped};
 use sapwise_lab::write::write_atomically;
@@ -106,7 +108,7 @@ fn add_gpus(registry: &mut Registry, id: &AlgorithmId) -> anyhow::Result<()> {
     if let Some(why) = seen.lacks(indices) {
         return Err(WrongUsage(format!("{id} can't run here: {why}; `sapwise devices` lists what can")).into());
     }
-    registry.add_gpus(&seen.load().map_err(anyhow::Error::msg)?);
+    sapwise_gpu::add_to(registry, &seen.load().map_err(anyhow::Error::msg)?);
     Ok(())
 }
 

@@ -5,14 +5,14 @@ use crate::args::{Part, PartKind};
 use crate::exit::{Outcome, WrongUsage};
 use crate::sweep::{SweepRequest, sweep};
 use crate::{child, gpus, output};
-use sapwise::Backend;
-use sapwise::measure::{self, Family, Options};
+use sapwise::algorithm::Backend;
+use sapwise_tune::measure::{self, Family, Options};
 
 pub(crate) fn run(arguments: Part, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
     child::end_with_parent();
     match arguments.part {
         PartKind::Hardware { family, threads } => {
-            let family: Family = family.parse().map_err(|e: sapwise::UnknownName| WrongUsage(e.to_string()))?;
+            let family: Family = family.parse().map_err(|e: sapwise::error::UnknownName| WrongUsage(e.to_string()))?;
             let parameters = measure::family(family, &Options::default().with_threads(threads));
             output::print_json(&parameters)?;
         }

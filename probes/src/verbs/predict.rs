@@ -10,7 +10,7 @@ use crate::prediction::{self, Slice};
 use crate::terminal::Terminal;
 use crate::{interrupt, output, outputs, shell, summary};
 use anyhow::{Context, bail};
-use sapwise::json;
+use sapwise_tune::json;
 use sapwise_lab::data::{Document, read_document};
 use sapwise_lab::report::Report;
 use sapwise_lab::write::write_text;

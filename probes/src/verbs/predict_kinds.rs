@@ -7,7 +7,7 @@ use crate::progress::Progress;
 use crate::terminal::Terminal;
 use crate::{interrupt, output, outputs, prediction, shell};
 use anyhow::Context;
-use sapwise::{GpuIdentity, json};
+use sapwise_tune::{GpuIdentity, json};
 use sapwise_lab::data::read_reports;
 use sapwise_lab::kinds::{Kind, Times, unusable};
 use sapwise_lab::report::Report;

@@ -6,7 +6,7 @@ use crate::training::{StoredModel, read_model_and_skipped};
 use anyhow::{Context, bail};
 use rayon::prelude::*;
 use sapwise::Tuning;
-use sapwise::json::{Format, Schema};
+use sapwise_tune::json::{Format, Schema};
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::Read;

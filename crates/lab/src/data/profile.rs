@@ -2,8 +2,10 @@
 
 use crate::report::{Label, Point, Report, Timed, Timing};
 use crate::sweep::median;
-use sapwise::hardware::ParameterId;
-use sapwise::{AlgorithmId, BackendClass, Entry, Hardware, Load};
+use sapwise::AlgorithmId;
+use sapwise::algorithm::{BackendClass, Entry, Load};
+use sapwise_tune::Hardware;
+use sapwise_tune::hardware::ParameterId;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// A report without its samples, of which thousands fit into memory.

@@ -2,7 +2,8 @@
 
 use super::profile::{FEWEST_SAMPLES, Profile};
 use crate::report::{Label, Report};
-use sapwise::{AlgorithmId, BackendClass};
+use sapwise::AlgorithmId;
+use sapwise::algorithm::BackendClass;
 use std::collections::{BTreeMap, HashMap};
 
 /// What shares a revision: a method on one class of processor.

@@ -2,8 +2,12 @@
 
 use super::regret_table::{NOT_TIMED, Strategy};
 use crate::data::{COMPARED, COMPARED_OF_GPUS, Profile, figure};
-use sapwise::model::GPU_PREFIX;
-use sapwise::{AlgorithmCost, AlgorithmId, BackendClass, Hardware, Tuning, stats};
+use sapwise::{AlgorithmId, Tuning};
+use sapwise::algorithm::BackendClass;
+use sapwise::internals::stats;
+use sapwise::tuning::AlgorithmCost;
+use sapwise_tune::Hardware;
+use sapwise_tune::model::GPU_PREFIX;
 
 /// Always chooses the algorithm with the least mean regret over the training profiles, each of which comes with the regret of always
 /// choosing each of its algorithms and counts the same.
@@ -37,7 +41,7 @@ pub(super) fn frozen<'a>(last: u32, above: &str, available: &[AlgorithmId]) -> S
 
 /// Chooses the cheapest by cost curves. The nearest number of threads stands in for one that the machine doesn't have.
 pub fn by_costs(costs: Vec<AlgorithmCost>, available: &[AlgorithmId]) -> Strategy<'_> {
-    let tuning = Tuning::from_costs(sapwise::Source::Measured, "", costs, &[]);
+    let tuning = Tuning::from_costs(sapwise::tuning::Source::Measured, "", costs, &[]);
     Box::new(move |load| {
         let best = tuning.rank(load, |k| closest(&tuning.costs[k].algorithm, available).is_some())?.best;
         closest(&tuning.costs[best].algorithm, available)
@@ -86,7 +90,7 @@ pub(super) fn nearest(known: &[&Likeness], own: &Likeness) -> Option<usize> {
 mod tests {
     use super::*;
     use crate::synthetic::Machine;
-    use sapwise::Load;
+    use sapwise::algorithm::Load;
 
     fn ids(list: &[&str]) -> Vec<AlgorithmId> {
         list.iter().map(|id| id.parse().unwrap()).collect()

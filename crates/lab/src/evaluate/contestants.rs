@@ -9,8 +9,10 @@ use crate::data::Profile;
 use crate::fit::{Designs, TrainingSet, measured_costs, model};
 use anyhow::Result;
 use rayon::prelude::*;
-use sapwise::model::MethodModel;
-use sapwise::{AlgorithmCost, AlgorithmId, Model};
+use sapwise::AlgorithmId;
+use sapwise::tuning::AlgorithmCost;
+use sapwise_tune::Model;
+use sapwise_tune::model::MethodModel;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 

@@ -2,8 +2,8 @@
 
 use crate::data::Profile;
 use crate::training::Coverage;
-use sapwise::AlgorithmCost;
-use sapwise::stats::{mean, quantile};
+use sapwise::internals::stats::{mean, quantile};
+use sapwise::tuning::AlgorithmCost;
 use std::collections::BTreeMap;
 
 /// The share of times that an interval should hold.

@@ -10,9 +10,11 @@ use linfa::DatasetBase;
 use linfa::traits::Fit;
 use linfa_linear::LinearRegression;
 use ndarray::{Array1, Array2, Axis};
-use sapwise::hardware::ParameterId;
-use sapwise::stats::mean;
-use sapwise::{AlgorithmId, BackendClass, Hardware};
+use sapwise::AlgorithmId;
+use sapwise::algorithm::BackendClass;
+use sapwise::internals::stats::mean;
+use sapwise_tune::Hardware;
+use sapwise_tune::hardware::ParameterId;
 
 /// Parameters whose logarithms a crossover is regressed on. Few, because there are only as many rows as reports.
 const PARAMETERS: [&str; 4] = [

@@ -6,7 +6,7 @@ use super::scores::{Part, split};
 use crate::data::Profile;
 use crate::training::Floor;
 use rayon::prelude::*;
-use sapwise::AlgorithmCost;
+use sapwise::tuning::AlgorithmCost;
 use std::collections::BTreeMap;
 
 /// Points that a run needs: fewer are no whole sweep.

@@ -3,7 +3,8 @@
 use super::crossovers::ComparedCrossover;
 use super::scores::{Judged, OURS, regrets_of_units};
 use crate::data::{Profile, Spot};
-use sapwise::{AlgorithmCost, AlgorithmId};
+use sapwise::AlgorithmId;
+use sapwise::tuning::AlgorithmCost;
 use std::collections::BTreeSet;
 
 /// Times of a profile that are kept, about.

@@ -5,7 +5,7 @@ use crate::data::{Profile, figure};
 use anyhow::Result;
 use ndarray::{Array2, Axis};
 use rayon::prelude::*;
-use sapwise::stats::mean;
+use sapwise::internals::stats::mean;
 use sapwise_scenes::Random;
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,7 +1,7 @@
 //! Which profiles are held out together.
 
 use crate::data::Profile;
-use sapwise::hardware::ParameterId;
+use sapwise_tune::hardware::ParameterId;
 use std::collections::BTreeMap;
 
 /// Most machines that are held out one by one, and groups that more machines form. Each fold costs a fit of everything.

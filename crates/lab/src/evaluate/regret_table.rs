@@ -2,8 +2,9 @@
 
 use crate::data::{Profile, Spot};
 use crate::spread::range;
-use sapwise::stats::mean;
-use sapwise::{AlgorithmId, Load};
+use sapwise::AlgorithmId;
+use sapwise::algorithm::Load;
+use sapwise::internals::stats::mean;
 use std::collections::BTreeMap;
 
 /// Chooses an algorithm of a machine for a load; `None` if it knows none of them.

@@ -12,10 +12,13 @@ use crate::fit::terms::{Component, is_incremental};
 use crate::fit::weights::weights;
 use anyhow::Result;
 use ndarray::{Array1, Array2, Axis};
-use sapwise::hardware::ParameterId;
-use sapwise::model::{FallbackModel, HelpersModel, MethodModel, ModelTerm, PredictError, ThreadFigures};
-use sapwise::stats::robust_deviation;
-use sapwise::{AlgorithmId, Backend, BackendClass, Fallback, GpuKind, Hardware, Places, Work};
+use sapwise::AlgorithmId;
+use sapwise::algorithm::{Backend, BackendClass};
+use sapwise::internals::{Fallback, Places, Work};
+use sapwise::internals::stats::robust_deviation;
+use sapwise_tune::{GpuKind, Hardware};
+use sapwise_tune::hardware::ParameterId;
+use sapwise_tune::model::{FallbackModel, HelpersModel, MethodModel, ModelTerm, PredictError, ThreadFigures};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

@@ -7,8 +7,9 @@ use crate::fit::method_rows::rows_by_method;
 use crate::fit::rows::Row;
 use crate::fit::terms::{Component, components, fallback_method};
 use anyhow::Result;
-use sapwise::model::MethodModel;
-use sapwise::{BackendClass, Places};
+use sapwise::algorithm::BackendClass;
+use sapwise::internals::Places;
+use sapwise_tune::model::MethodModel;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

@@ -1,6 +1,6 @@
 //! How a method calls its helpers: four numbers that predict the time on several threads from that on one.
 
-use sapwise::model::{HelpersModel, ThreadFigures};
+use sapwise_tune::model::{HelpersModel, ThreadFigures};
 
 /// One timing on several threads.
 #[derive(Debug, Clone, Copy)]

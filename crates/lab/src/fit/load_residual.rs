@@ -4,7 +4,8 @@ use crate::data::Profile;
 use anyhow::{Context, Result};
 use linfa_linalg::cholesky::SolveCInplace;
 use ndarray::{Array1, Array2, Axis};
-use sapwise::{Load, Places};
+use sapwise::algorithm::Load;
+use sapwise::internals::Places;
 use sapwise_scenes::Random;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -82,7 +83,7 @@ pub(crate) fn places<'a>(profiles: impl Iterator<Item = &'a Profile>, without: O
 pub(crate) fn weights(places: &Places, remainders: &[Remainder], by_motion: bool) -> Result<Vec<f64>> {
     let some = Random::named(1, &["rows"]).shuffled(remainders.len());
     let rows: Vec<&Remainder> = some.into_iter().take(MOST_ROWS).map(|k| &remainders[k]).collect();
-    let spread = sapwise::stats::robust_deviation(&rows.iter().map(|r| r.ln).collect::<Vec<f64>>()).unwrap_or(0.0);
+    let spread = sapwise::internals::stats::robust_deviation(&rows.iter().map(|r| r.ln).collect::<Vec<f64>>()).unwrap_or(0.0);
     let reach = (REACH * spread).max(LEAST_REACH_LN);
     let count = places.loads().len();
     let mut likeness = Array2::zeros((rows.len(), count));
@@ -108,7 +109,7 @@ mod tests {
     use super::*;
     use crate::data::Spot;
     use crate::synthetic::Machine;
-    use sapwise::Residual;
+    use sapwise::internals::Residual;
 
     fn profiles() -> Vec<Profile> {
         Machine::family().into_iter().take(2).map(|m| Profile::of(m.name, &m.report())).collect()

@@ -3,7 +3,7 @@
 use super::rows::{Row, rows};
 use crate::data::Profile;
 use rayon::prelude::*;
-use sapwise::BackendClass;
+use sapwise::algorithm::BackendClass;
 use std::collections::BTreeMap;
 
 /// Rows of a method, about. Its dozen coefficients need no more, and the time of a fit is proportional to them.

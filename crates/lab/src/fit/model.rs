@@ -3,8 +3,9 @@
 use super::designs::{Designs, Fitted, TrainingSet};
 use crate::data::{COMPARED, COMPARED_OF_GPUS, Profile, is_real};
 use anyhow::{Result, bail};
-use sapwise::model::{GPU_PREFIX, Range};
-use sapwise::{Backend, GpuHardware, Model};
+use sapwise::algorithm::Backend;
+use sapwise_tune::{GpuHardware, Model};
+use sapwise_tune::model::{GPU_PREFIX, Range};
 
 /// Fits a model to the chosen profiles. Returns it with sentences on what was left out and why.
 ///
@@ -61,7 +62,7 @@ fn timed_gpus(profile: &Profile) -> impl Iterator<Item = &GpuHardware> {
 mod tests {
     use super::*;
     use crate::synthetic::Machine;
-    use sapwise::GpuKind;
+    use sapwise_tune::GpuKind;
 
     #[test]
     fn the_ranges_of_gpus_are_of_the_real_ones_where_there_is_one() {

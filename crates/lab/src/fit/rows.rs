@@ -1,7 +1,7 @@
 //! From profiles to the rows of a regression.
 
 use crate::data::{Profile, Spot};
-use sapwise::{BackendClass, Load};
+use sapwise::algorithm::{BackendClass, Load};
 use std::collections::BTreeMap;
 
 /// The median time of one algorithm at one point.

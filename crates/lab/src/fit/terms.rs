@@ -1,7 +1,8 @@
 //! The terms of the time of a method.
 
-use sapwise::model::Scale;
-use sapwise::{BackendClass, Term};
+use sapwise::algorithm::BackendClass;
+use sapwise::tuning::Term;
+use sapwise_tune::model::Scale;
 
 /// Counts of a frame that share one unit: a factor, a term and a scale each.
 #[derive(Debug, Clone, PartialEq)]

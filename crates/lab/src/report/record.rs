@@ -1,8 +1,11 @@
 //! What a report holds.
 
-use sapwise::model::Scale;
-use sapwise::stats::median;
-use sapwise::{AlgorithmId, Hardware, Load, Term};
+use sapwise::AlgorithmId;
+use sapwise::algorithm::Load;
+use sapwise::internals::stats::median;
+use sapwise::tuning::Term;
+use sapwise_tune::Hardware;
+use sapwise_tune::model::Scale;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -154,7 +157,7 @@ pub struct Point {
     pub foreign_load: Option<f64>,
     /// Frames that were dropped because of foreign load.
     pub spoiled: u32,
-    /// [`ParameterId::CoreToCoreNs`](sapwise::ParameterId::CoreToCoreNs) before and after the samples. It changes when a hypervisor
+    /// [`ParameterId::CoreToCoreNs`](sapwise_tune::ParameterId::CoreToCoreNs) before and after the samples. It changes when a hypervisor
     /// moves the cores of a guest, and with it the speed-up of several threads. Absent on one core.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub core_to_core_ns: Option<[f64; 2]>,

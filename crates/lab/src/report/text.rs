@@ -1,7 +1,7 @@
 //! Reports as JSON text.
 
 use super::record::Report;
-use sapwise::json::{Error, Format, Read};
+use sapwise_tune::json::{Error, Format, Read};
 
 /// Files of reports.
 pub const FORMAT: Format = Format::new("report", 2);

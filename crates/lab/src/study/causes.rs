@@ -7,8 +7,9 @@ use crate::evaluate::influences;
 use crate::figures::{Matrix, Ratios};
 use crate::report::Label;
 use anyhow::Result;
-use sapwise::stats::mean;
-use sapwise::{AlgorithmId, GpuHardware};
+use sapwise::AlgorithmId;
+use sapwise::internals::stats::mean;
+use sapwise_tune::GpuHardware;
 use std::collections::BTreeMap;
 
 /// Points that two hosts must share for a speed-up.
@@ -77,7 +78,7 @@ pub(super) fn section(material: &Material, page: &mut Page, files: &mut Vec<(&st
 }
 
 fn cpus(reference: &Profile, others: &[&Profile]) -> Ratios {
-    let parameter = |id: sapwise::hardware::ParameterId| {
+    let parameter = |id: sapwise_tune::hardware::ParameterId| {
         let ratio = |p: &&Profile| ratio(p.hardware.value(id), reference.hardware.value(id));
         (id.as_str().replace('_', " "), others.iter().map(ratio).collect())
     };
@@ -97,7 +98,7 @@ fn cpus(reference: &Profile, others: &[&Profile]) -> Ratios {
 }
 
 fn gpus(reference: &GpuHardware, others: &[&GpuHardware]) -> Ratios {
-    let row = |(name, id): (&str, sapwise::hardware::GpuParameterId)| {
+    let row = |(name, id): (&str, sapwise_tune::hardware::GpuParameterId)| {
         let ratios = others.iter().map(|g| ratio(g.value(id), reference.value(id)));
         (name.to_owned(), ratios.collect())
     };

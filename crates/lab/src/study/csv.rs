@@ -2,7 +2,7 @@
 
 use super::Material;
 use anyhow::Result;
-use sapwise::{Backend, BackendClass};
+use sapwise::algorithm::{Backend, BackendClass};
 
 /// Writes a table with these columns.
 fn table(columns: &str, rows: impl Iterator<Item = Vec<String>>) -> Result<String> {

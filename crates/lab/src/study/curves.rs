@@ -5,8 +5,9 @@ use crate::data::{Profile, is_real};
 use crate::figures::{Curve, CurvePanel, Curves, Field};
 use crate::fit::slice_tuning;
 use anyhow::Result;
-use sapwise::stats::{mean, median};
-use sapwise::{AlgorithmId, Backend, BackendClass, Tuning};
+use sapwise::{AlgorithmId, Tuning};
+use sapwise::algorithm::{Backend, BackendClass};
+use sapwise::internals::stats::{mean, median};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Hosts in one figure at most.

@@ -4,7 +4,7 @@ use super::{Material, Page, title};
 use crate::data::COMPARED;
 use crate::label_text::kind;
 use crate::report::Label;
-use sapwise::hardware::{GpuParameterId, with_unit};
+use sapwise_tune::hardware::{GpuParameterId, with_unit};
 
 /// The rows of the paper's table, in its order.
 pub(super) const PAPER: [(&str, GpuParameterId); 7] = [

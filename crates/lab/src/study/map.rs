@@ -6,8 +6,10 @@ use crate::figures::{Cell, FieldMap, MapPanel};
 use crate::train::without;
 use anyhow::{Result, ensure};
 use rayon::prelude::*;
-use sapwise::stats::median;
-use sapwise::{Aabb, AlgorithmCost, Load};
+use sapwise::Aabb;
+use sapwise::algorithm::Load;
+use sapwise::internals::stats::median;
+use sapwise::tuning::AlgorithmCost;
 use sapwise_scenes::Random;
 
 /// Cells on either axis.

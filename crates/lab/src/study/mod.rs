@@ -20,7 +20,7 @@ use anyhow::{Context, Result, bail};
 use page::Page;
 use rayon::prelude::*;
 use sapwise::Tuning;
-use sapwise::hardware::ParameterId;
+use sapwise_tune::hardware::ParameterId;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs;

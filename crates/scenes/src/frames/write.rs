@@ -4,7 +4,8 @@ use std::io::{self, Write};
 
 use super::BOUNDS;
 use super::header::Header;
-use sapwise::{Aabb, Pair};
+use sapwise::Aabb;
+use sapwise::internals::Pair;
 
 /// Writes a stream of frames for [`Frames::read`](super::Frames::read), one frame at a time.
 ///

@@ -11,7 +11,7 @@ use crate::replay::{FrameSource, ReplaySettings, Swing, check_trace, replay, too
 use crate::terminal::Terminal;
 use crate::{interrupt, output, outputs};
 use anyhow::{Context, bail};
-use sapwise::usable_cores;
+use sapwise::algorithm::usable_cores;
 use sapwise_lab::text::count;
 use sapwise_lab::write::write_text;
 use sapwise_scenes::{Frames, Scenario};

@@ -7,7 +7,9 @@ use crate::hardware::measure_hardware;
 use crate::prediction::{self, Slice};
 use crate::{output, revisions};
 use anyhow::{Context, bail};
-use sapwise::{AlgorithmId, GpuIdentity, Registry, Source, Tuning, measure};
+use sapwise::{AlgorithmId, Registry, Tuning};
+use sapwise::tuning::Source;
+use sapwise_tune::{GpuIdentity, measure};
 use sapwise_lab::data::{Document, read_document, usual_scenario};
 use sapwise_lab::fit::measured_tuning;
 use sapwise_scenes::Scenario;
@@ -80,7 +82,7 @@ pub(super) fn read(path: &Path, registry: &Registry, choice: &GpuChoice) -> anyh
         Document::Report(mut report) => {
             choice.restrict(&mut report);
             fresh(revisions::stale_in_report(&report, registry))?;
-            let tuning = measured_tuning(&report, usual_scenario(&report), sapwise::Model::built_in().ok().as_ref())
+            let tuning = measured_tuning(&report, usual_scenario(&report), sapwise_tune::Model::built_in().ok().as_ref())
                 .with_context(|| format!("{} yields no tuning", path.display()))?;
             let machine = &report.hardware.machine;
             let here = machine.physical_id == measure::machine().physical_id;
@@ -120,7 +122,7 @@ pub(super) fn add_gpus(registry: &mut Registry, tuning: &Tuning, choice: &GpuCho
     }
     if !taken.is_empty() {
         match seen.load() {
-            Ok(gpus) => registry.add_gpus(&gpus.choose(|g| taken.contains(g))),
+            Ok(gpus) => sapwise_gpu::add_to(registry, &gpus.choose(|g| taken.contains(g))),
             Err(why) => warnings.push(why),
         }
     }

@@ -3,8 +3,10 @@ use crate::fit::rows::rows;
 use crate::fit::weights::weights;
 use crate::report::Label;
 use crate::synthetic::{Machine, gpu_truth, truth};
-use sapwise::hardware::{GpuParameterId, ParameterId};
-use sapwise::{AlgorithmId, GpuKind, Model, Term};
+use sapwise::AlgorithmId;
+use sapwise::tuning::Term;
+use sapwise_tune::{GpuKind, Model};
+use sapwise_tune::hardware::{GpuParameterId, ParameterId};
 
 fn profiles(machines: impl IntoIterator<Item = Machine>) -> Vec<Profile> {
     machines.into_iter().map(|m| Profile::of(&format!("{}.json", m.name), &m.report())).collect()

@@ -1,0 +1,175 @@
+use super::{Engine, Pending};
+use sapwise::Aabb;
+use sapwise::error::GpuErrorKind;
+use crate::failure::Failure;
+use crate::kernel::dispatched;
+use crate::look::Look;
+use crate::output::Output;
+use crate::params::{Header, Params};
+use crate::{first_for_tests, Gpus};
+use sapwise::{PairOrder, Pairs};
+use sapwise::internals::{SampledBoxes, Scenario, Scene};
+use wgpu::util::DeviceExt;
+
+const METHODS: [&str; 4] = ["brute", "sap", "grid-sap", "bvh"];
+const SORTING: [&str; 3] = ["sap", "grid-sap", "bvh"];
+
+/// Returns boxes of all sizes, each among many: every row has more candidates than the budgets below.
+fn crowded() -> Vec<Aabb> {
+    let mut scene = Scene::start(Scenario::Mixed, 700, 9);
+    scene.advance();
+    let far = (0..50).map(|k| Aabb::cube([1.0e6, k as f32, 0.0], 3.0));
+    scene.boxes().iter().copied().chain(far).collect()
+}
+
+/// Returns a row of boxes with 299 pairs.
+fn row() -> Vec<Aabb> {
+    (0..300).map(|k| Aabb::cube([k as f32, 0.0, 0.0], 0.6)).collect()
+}
+
+fn oracle(boxes: &[Aabb]) -> Vec<(u32, u32)> {
+    let mut pairs = Vec::new();
+    for j in 0..boxes.len() {
+        pairs.extend((0..j).filter(|&i| boxes[i].overlaps(&boxes[j])).map(|i| (i as u32, j as u32)));
+    }
+    pairs.sort_unstable();
+    pairs
+}
+
+fn plan(engine: &Engine, boxes: &[Aabb]) -> Params {
+    engine.plan(boxes.len() as u32, || Look::at(&SampledBoxes::from(boxes)))
+}
+
+fn start(engine: &mut Engine, boxes: &[Aabb]) {
+    engine.start(boxes, None, plan(engine, boxes)).unwrap();
+}
+
+fn finish(engine: &mut Engine) -> Result<usize, Failure> {
+    let mut pairs = Pairs::new();
+    engine.finish(&mut pairs).map(|()| pairs.len())
+}
+
+fn assert_inert(found: Result<usize, Failure>) {
+    assert!(matches!(&found, Err(Failure::Gpu(error)) if error.kind() == GpuErrorKind::Inert), "{found:?}");
+}
+
+#[test]
+fn rows_go_on_after_their_budget() {
+    let gpus = Gpus::find();
+    let boxes = crowded();
+    let expected = oracle(&boxes);
+    for index in 0..gpus.len() as u32 {
+        for method in SORTING {
+            let mut engine = Engine::new(gpus.open(index).unwrap(), method).unwrap();
+            for budget in [7, 100] {
+                let params = Params { budget, ..plan(&engine, &boxes) };
+                engine.start(&boxes, None, params).unwrap();
+                let mut pairs = Pairs::with_order(PairOrder::Canonical);
+                engine.finish(&mut pairs).unwrap();
+                pairs.finish().unwrap();
+                assert!(pairs.as_slice() == expected, "{method} on gpu{index}, {budget} candidates at a time");
+            }
+        }
+    }
+}
+
+#[test]
+fn resident_pairs_of_several_submissions_are_contiguous() {
+    let Some(gpu) = first_for_tests() else { return };
+    let boxes = crowded();
+    let expected = oracle(&boxes);
+    let contents = bytemuck::cast_slice(&boxes);
+    let usage = wgpu::BufferUsages::STORAGE;
+    let buffer = gpu.device().create_buffer_init(&wgpu::util::BufferInitDescriptor { label: None, contents, usage });
+    for method in SORTING {
+        let mut engine = Engine::resident(gpu.clone(), method).unwrap();
+        // The list of pairs grows in the middle of the first frame, and has room for the second.
+        for _ in 0..2 {
+            let params = Params { budget: 20, ..plan(&engine, &boxes) };
+            engine.start_resident(&buffer, params).unwrap();
+            let (count, look) = engine.finish_resident().unwrap();
+            assert_eq!(count as usize, expected.len(), "{method}");
+            assert!(look.sample.extent[0] > 0.0);
+            assert_eq!(pairs_on_cpu(&engine, count), expected, "{method}");
+        }
+    }
+}
+
+/// Returns the pairs that stayed on the GPU, sorted.
+fn pairs_on_cpu(engine: &Engine, count: u32) -> Vec<(u32, u32)> {
+    let size = u64::from(count) * 8;
+    let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
+    let descriptor = wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false };
+    let copy = engine.gpu.device().create_buffer(&descriptor);
+    let mut encoder = engine.gpu.record();
+    encoder.copy_buffer_to_buffer(engine.pairs_buffer(), 0, &copy, 0, size);
+    let submission = engine.gpu.submit(encoder).unwrap();
+    copy.map_async(wgpu::MapMode::Read, .., |_| {});
+    engine.gpu.wait(submission).unwrap();
+    let view = copy.get_mapped_range(..).unwrap();
+    let list: &[[u32; 2]] = bytemuck::cast_slice(&view);
+    let mut pairs: Vec<(u32, u32)> = list.iter().map(|&[i, j]| (i, j)).collect();
+    pairs.sort_unstable();
+    pairs
+}
+
+/// Each dispatch waits for the previous one: a frame of few boxes takes as long as its dispatches.
+#[test]
+fn no_method_takes_more_dispatches() {
+    let Some(gpu) = first_for_tests() else { return };
+    // The third level of a tree of 40 000 boxes has more nodes than a walk tests one by one.
+    for (boxes, expected) in [(1000, [13, 9, 14]), (40_000, [13, 10, 15])] {
+        let boxes: Vec<Aabb> = (0..boxes).map(|k| Aabb::cube([k as f32, 0.0, 0.0], 0.4)).collect();
+        for (method, expected) in SORTING.into_iter().zip(expected) {
+            let mut engine = Engine::new(gpu.clone(), method).unwrap();
+            let before = dispatched();
+            start(&mut engine, &boxes);
+            assert_eq!(dispatched() - before, expected, "{method}, {} boxes", boxes.len());
+            assert_eq!(finish(&mut engine), Ok(0));
+        }
+    }
+}
+
+#[test]
+fn a_frame_without_a_kernel_is_the_fault_of_the_gpu() {
+    for method in METHODS {
+        let Some(gpu) = first_for_tests() else { return };
+        let mut engine = Engine::new(gpu.clone(), method).unwrap();
+        for _ in 0..3 {
+            start(&mut engine, &row());
+            assert_eq!(finish(&mut engine), Ok(299), "{method}");
+        }
+        // A new output of the same size is not bound, and what is not bound is not dispatched.
+        let mut output = Output::new(&gpu).unwrap();
+        output.ensure_blocks(&gpu, 1 << 16).unwrap();
+        output.ensure_pairs(&gpu, u64::from(engine.output.capacity())).unwrap();
+        engine.output = output;
+        start(&mut engine, &row());
+        assert_inert(finish(&mut engine));
+        let fault = gpu.fault().unwrap();
+        assert!(fault.contains("gpu0 (") && fault.contains("executes nothing"), "{method}: {fault}");
+        assert_eq!(gpu.check().unwrap_err().kind(), GpuErrorKind::Inert);
+    }
+}
+
+#[test]
+fn the_answer_to_another_submission_does_not_count() {
+    let Some(gpu) = first_for_tests() else { return };
+    let mut engine = Engine::new(gpu, "sap").unwrap();
+    start(&mut engine, &row());
+    assert_eq!(finish(&mut engine), Ok(299));
+    start(&mut engine, &row());
+    let number = engine.next_submission();
+    let Pending::Frame(frame) = &mut engine.pending else { panic!("no frame is pending") };
+    frame.params.submission = number;
+    assert_inert(finish(&mut engine));
+}
+
+#[test]
+fn no_submission_has_the_number_of_an_untouched_header() {
+    let Some(gpu) = first_for_tests() else { return };
+    let mut engine = Engine::new(gpu, "brute").unwrap();
+    engine.submissions = u32::MAX;
+    assert_eq!(engine.next_submission(), 1);
+    assert_ne!(engine.next_submission(), Header::START.ran);
+}

@@ -1,0 +1,210 @@
+//! The methods that sort the boxes: sap, grid-sap and bvh. See `shaders/rows.wgsl` and the shader of each.
+
+use super::cells::Cells;
+use super::device::Gpu;
+use super::kernel::{Bound, Kernel, source};
+use super::look::Look;
+use super::output::Output;
+use super::params::Params;
+use super::search::{Inputs, Search};
+use super::sort::Sort;
+use super::storage::Storage;
+use super::tree::Tree;
+use sapwise::error::GpuError;
+
+/// Rows of one block, and boxes of one workgroup of the other kernels.
+const ROWS: u32 = 64;
+const BOXES: u32 = 256;
+/// Bytes of a sorted box.
+const SORTED_BOX: u64 = 32;
+/// Bytes of a sorted box and its share of the nodes of a tree: an eighth of a node a level.
+pub(super) const MOST_OF_BOX: u64 = 40;
+/// Words of a row: its number of pairs, and its states before and after a submission.
+const ROW_WORDS: u64 = 3;
+/// Words for the pairs that a row keeps from counting to writing.
+const KEPT_WORDS: u64 = 4;
+
+/// The order of the boxes, and where the rows are searched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Sap,
+    GridSap,
+    Bvh,
+}
+
+impl Kind {
+    /// Returns the kind of a method.
+    pub(super) fn named(method: &str) -> Option<Self> {
+        match method {
+            "sap" => Some(Self::Sap),
+            "grid-sap" => Some(Self::GridSap),
+            "bvh" => Some(Self::Bvh),
+            _ => None,
+        }
+    }
+}
+
+/// A method that sorts, on one GPU. Its blocks are 64 rows, one for each box.
+#[derive(Debug)]
+pub(super) struct Sorted {
+    kind: Kind,
+    order: Order,
+    make_keys: Kernel,
+    gather: Kernel,
+    tree: Option<Tree>,
+    count: Kernel,
+    write: Kernel,
+    /// The sorted boxes, then the levels of the tree.
+    boxes: Storage,
+    rows: Storage,
+    kept: Storage,
+    bound: Option<[Bound; 4]>,
+}
+
+/// What sorts the boxes.
+#[derive(Debug)]
+enum Order {
+    Radix(Sort),
+    Cells(Cells),
+}
+
+impl Sorted {
+    pub(super) fn new(gpu: &Gpu, kind: Kind) -> Result<Self, GpuError> {
+        let (rows, keys, gather) = match kind {
+            Kind::Sap => (source::SAP, "sweep_keys", "gather"),
+            Kind::GridSap => (source::GRID_SAP, "cell_keys", "gather_cells"),
+            Kind::Bvh => (source::BVH, "curve_keys", "gather"),
+        };
+        Ok(Self {
+            kind,
+            order: match kind {
+                Kind::GridSap => Order::Cells(Cells::new(gpu)?),
+                Kind::Sap | Kind::Bvh => Order::Radix(Sort::new(gpu)?),
+            },
+            make_keys: Kernel::new(gpu, source::KEYS, keys)?,
+            gather: Kernel::new(gpu, source::GATHER, gather)?,
+            tree: match kind {
+                Kind::Sap => None,
+                Kind::GridSap | Kind::Bvh => Some(Tree::new(gpu, kind == Kind::GridSap)?),
+            },
+            count: Kernel::new(gpu, rows, "count")?,
+            write: Kernel::new(gpu, rows, "write")?,
+            boxes: Storage::new(gpu, "sorted boxes")?,
+            rows: Storage::new(gpu, "rows")?,
+            kept: Storage::new(gpu, "kept pairs")?,
+            bound: None,
+        })
+    }
+}
+
+impl Search for Sorted {
+    fn most_objects(&self) -> usize {
+        // The pairs of a block are counted in 32 bits.
+        1 << 26
+    }
+
+    fn growth(&self) -> f64 {
+        if self.kind == Kind::Sap { 5.0 / 3.0 } else { 1.0 }
+    }
+
+    fn plan(&self, objects: u32, look: &dyn Fn() -> Look) -> Params {
+        match self.kind {
+            Kind::Sap => Params::sap(&look(), objects),
+            Kind::GridSap => Params::grid_sap(&look(), objects),
+            Kind::Bvh => Params::bvh(&look(), objects),
+        }
+    }
+
+    fn blocks(&self, objects: u32) -> u64 {
+        u64::from(objects.div_ceil(ROWS))
+    }
+
+    fn ensure(&mut self, gpu: &Gpu, params: &Params) -> Result<bool, GpuError> {
+        let n = u64::from(params.objects);
+        let mut grown = match &mut self.order {
+            Order::Radix(sort) => sort.ensure(gpu, params.objects)?,
+            Order::Cells(cells) => cells.ensure(gpu, params)?,
+        };
+        let elements = if self.tree.is_some() { Tree::elements(params.objects) } else { n };
+        grown |= self.boxes.ensure(gpu, elements * SORTED_BOX)?;
+        grown |= self.rows.ensure(gpu, n * ROW_WORDS * 4)?;
+        Ok(self.kept.ensure(gpu, n * KEPT_WORDS * 4)? | grown)
+    }
+
+    fn bind(&mut self, gpu: &Gpu, inputs: &Inputs<'_>, output: &Output) -> Result<(), GpuError> {
+        let Inputs { params, boxes, ids, header } = *inputs;
+        let sorted = self.boxes.buffer();
+        let mut make_keys = vec![(0, params), (1, boxes), (2, ids), (3, header)];
+        let mut gather = vec![(0, params), (1, boxes), (2, ids), (5, sorted)];
+        let mut rows = vec![
+            (0, params),
+            (2, sorted),
+            (4, output.sums()),
+            (5, output.pairs()),
+            (6, self.rows.buffer()),
+            (7, self.kept.buffer()),
+        ];
+        let mut table = None;
+        match &mut self.order {
+            Order::Radix(sort) => {
+                sort.bind(gpu, params)?;
+                let [keys, counts] = sort.unsorted();
+                make_keys.extend([(4, keys), (5, counts)]);
+                gather.push((4, sort.order()));
+            }
+            Order::Cells(cells) => {
+                cells.bind(gpu, params)?;
+                let [keys, counts, ranks] = cells.unsorted();
+                make_keys.extend([(4, keys), (5, counts), (6, ranks)]);
+                gather.extend([(4, cells.order()), (6, keys), (7, cells.table()), (8, cells.sorted_keys())]);
+                rows.extend([(1, cells.sorted_keys()), (8, cells.table())]);
+                table = Some(cells.table());
+            }
+        }
+        if let Some(tree) = &mut self.tree {
+            tree.bind(gpu, params, sorted, table)?;
+        }
+        let write = self.write.bind(gpu, &rows)?;
+        rows.push((3, header));
+        self.bound = Some([
+            self.make_keys.bind(gpu, &make_keys)?,
+            self.gather.bind(gpu, &gather)?,
+            self.count.bind(gpu, &rows)?,
+            write,
+        ]);
+        Ok(())
+    }
+
+    fn clear(&self, encoder: &mut wgpu::CommandEncoder, params: &Params) {
+        match &self.order {
+            Order::Radix(sort) => sort.clear(encoder, params.objects),
+            Order::Cells(cells) => cells.clear(encoder, params),
+        }
+    }
+
+    fn record_sort(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
+        let Some([make_keys, gather, ..]) = &self.bound else { return };
+        let groups = params.objects.div_ceil(BOXES);
+        make_keys.dispatch(pass, groups);
+        match &self.order {
+            Order::Radix(sort) => sort.record(pass, params.objects),
+            Order::Cells(cells) => cells.record(pass, params),
+        }
+        gather.dispatch(pass, groups);
+        if let Some(tree) = &self.tree {
+            tree.record(pass, params.objects);
+        }
+    }
+
+    fn record_count(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
+        if let Some([.., count, _]) = &self.bound {
+            count.dispatch(pass, params.blocks);
+        }
+    }
+
+    fn record_write(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
+        if let Some([.., write]) = &self.bound {
+            write.dispatch(pass, params.blocks);
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! Buffers that both the CPU and a GPU reach: mapped once, used every frame.
+
+use super::device::Gpu;
+use super::storage::Storage;
+use sapwise::error::GpuError;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
+use std::time::Instant;
+
+/// A buffer that the CPU writes or reads while it is mapped, and the GPU copies while it is not.
+#[derive(Debug)]
+pub(super) struct Transfer {
+    storage: Storage,
+    mode: wgpu::MapMode,
+    /// One of the constants below. The device sets it when a mapping is done.
+    state: Arc<AtomicU8>,
+}
+
+const UNMAPPED: u8 = 0;
+const ASKED: u8 = 1;
+const MAPPED: u8 = 2;
+
+const NOT_MAPPED: &str = "the driver refuses to map memory";
+
+impl Transfer {
+    /// Memory that the CPU writes.
+    pub(super) fn upload(gpu: &Gpu) -> Result<Self, GpuError> {
+        Self::new(gpu, "upload", wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC, wgpu::MapMode::Write)
+    }
+
+    /// Memory that the CPU reads.
+    pub(super) fn download(gpu: &Gpu) -> Result<Self, GpuError> {
+        Self::new(gpu, "download", wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST, wgpu::MapMode::Read)
+    }
+
+    fn new(gpu: &Gpu, label: &'static str, usage: wgpu::BufferUsages, mode: wgpu::MapMode) -> Result<Self, GpuError> {
+        Ok(Self { storage: Storage::with_usage(gpu, label, usage)?, mode, state: Arc::default() })
+    }
+
+    pub(super) fn buffer(&self) -> &wgpu::Buffer {
+        self.storage.buffer()
+    }
+
+    pub(super) fn bytes(&self) -> u64 {
+        self.storage.bytes()
+    }
+
+    pub(super) fn ensure(&mut self, gpu: &Gpu, bytes: u64) -> Result<(), GpuError> {
+        if bytes > self.storage.bytes() {
+            // The old buffer's callback must not change the new buffer's state.
+            self.state = Arc::default();
+            self.storage.ensure(gpu, bytes)?;
+        }
+        Ok(())
+    }
+
+    /// Asks the device to map the first `bytes` as soon as the GPU is done with them.
+    pub(super) fn ask(&self, gpu: &Gpu, bytes: u64) {
+        if self.state.compare_exchange(UNMAPPED, ASKED, Ordering::AcqRel, Ordering::Acquire).is_ok() {
+            let state = Arc::clone(&self.state);
+            let done = move |result: Result<(), wgpu::BufferAsyncError>| {
+                state.store(if result.is_ok() { MAPPED } else { UNMAPPED }, Ordering::Release);
+            };
+            gpu.map(self.storage.buffer().slice(0..bytes.next_multiple_of(8).min(self.bytes())), self.mode, done);
+        }
+    }
+
+    /// Returns the mapped memory to write to. Waits for the mapping unless it was asked for ahead.
+    pub(super) fn writable(&self, gpu: &Gpu, bytes: u64) -> Result<wgpu::BufferViewMut, GpuError> {
+        if self.state.load(Ordering::Acquire) != MAPPED {
+            self.ask(gpu, self.bytes());
+            gpu.wait_all()?;
+        }
+        self.mapped(gpu)?;
+        self.storage.buffer().get_mapped_range_mut(0..bytes).map_err(|e| gpu.refusal(NOT_MAPPED, e))
+    }
+
+    /// Returns the mapped memory to read from.
+    pub(super) fn readable(&self, gpu: &Gpu, bytes: std::ops::Range<u64>) -> Result<wgpu::BufferView, GpuError> {
+        self.mapped(gpu)?;
+        self.storage.buffer().get_mapped_range(bytes).map_err(|e| gpu.refusal(NOT_MAPPED, e))
+    }
+
+    /// Checks that the mapping is done, after a wait for the GPU. If several threads wait for one GPU, another one
+    /// may have taken this mapping's callback and be about to run it.
+    fn mapped(&self, gpu: &Gpu) -> Result<(), GpuError> {
+        let start = Instant::now();
+        while self.state.load(Ordering::Acquire) == ASKED && start.elapsed() < gpu.wait_limit() {
+            gpu.poll(wgpu::PollType::Poll).map_err(|e| gpu.refusal(NOT_MAPPED, e))?;
+            gpu.check()?;
+            std::thread::yield_now();
+        }
+        let mapped = self.state.load(Ordering::Acquire) == MAPPED;
+        if mapped { Ok(()) } else { Err(gpu.refusal(NOT_MAPPED, wgpu::BufferAsyncError)) }
+    }
+
+    /// Polls the device, and returns whether the memory is mapped. Does not wait.
+    pub(super) fn arrived(&self, gpu: &Gpu) -> Result<bool, GpuError> {
+        gpu.poll(wgpu::PollType::Poll).map_err(|e| gpu.refusal(NOT_MAPPED, e))?;
+        gpu.check()?;
+        Ok(self.state.load(Ordering::Acquire) == MAPPED)
+    }
+
+    /// Returns whether a mapping was asked for and has neither arrived nor failed.
+    pub(super) fn is_on_its_way(&self) -> bool {
+        self.state.load(Ordering::Acquire) == ASKED
+    }
+
+    /// Hands the memory back to the GPU.
+    pub(super) fn unmap(&mut self) {
+        if self.state.load(Ordering::Acquire) != UNMAPPED {
+            // A late callback of this mapping must not pass for one of the next.
+            self.state = Arc::default();
+            self.storage.buffer().unmap();
+        }
+    }
+}

@@ -1,0 +1,288 @@
+//! Every algorithm on every GPU of this machine, alone and together, against the naive oracle.
+//!
+//! Without a GPU the tests print that and pass, unless `SAPWISE_REQUIRE_GPU=1`. The feature `long-tests` adds large
+//! frames.
+
+mod common;
+
+use common::{Random, WORLDS, denormals, gpus, large_boxes, lattice, naive, naive_filtered};
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Filter, Membership, PairOrder, Pairs, Registry};
+use sapwise::error::BoxDefect;
+use sapwise_gpu::{Gpus, broad_phase};
+use sapwise_scenes::Scenario;
+
+type Algorithms = Vec<(String, Box<dyn BroadPhase>)>;
+
+/// Returns the ids of the registry that are on GPUs.
+fn on_gpus(registry: &Registry) -> Vec<AlgorithmId> {
+    registry.available().into_iter().map(|e| e.id).filter(|id| id.to_string().contains("@gpu")).collect()
+}
+
+/// Returns every algorithm of the registry on GPUs, and each method on two devices of the first GPU.
+fn every_algorithm(gpus: &Gpus) -> Algorithms {
+    let mut registry = Registry::with_cores(1);
+    sapwise_gpu::add_to(&mut registry, gpus);
+    let mut all: Algorithms =
+        on_gpus(&registry).iter().map(|id| (id.to_string(), registry.create(id).unwrap())).collect();
+    for method in ["brute", "sap", "grid-sap", "bvh"] {
+        let devices = vec![gpus.open(0).unwrap(), gpus.open_another(0).unwrap()];
+        all.push((format!("{method} on gpu0 twice"), broad_phase(method, devices).unwrap()));
+    }
+    all
+}
+
+fn assert_all_agree(name: &str, boxes: &[Aabb], algorithms: &mut Algorithms) {
+    assert_all_find(&naive(boxes), name, boxes, algorithms);
+}
+
+fn assert_all_find(expected: &[(u32, u32)], name: &str, boxes: &[Aabb], algorithms: &mut Algorithms) {
+    for (id, algorithm) in algorithms {
+        let mut canonical = Pairs::with_order(PairOrder::Canonical);
+        algorithm.find_pairs(boxes, &mut canonical).unwrap_or_else(|e| panic!("{id} on {name}: {e}"));
+        assert!(canonical.as_slice() == expected, "{id} on {name}: {} pairs, not {}", canonical.len(), expected.len());
+    }
+}
+
+/// Returns a frame with that many boxes.
+fn frame(scenario: Scenario, objects: usize) -> Vec<Aabb> {
+    let mut scene = scenario.start(objects, 42);
+    // Fragmentation alone changes its number of boxes, and reaches the largest within a cycle.
+    let frames = if scenario == Scenario::Fragmentation { Scenario::FRAGMENTATION_FRAMES } else { 2 };
+    for _ in 0..frames {
+        scene.advance();
+        if scene.frame() > 1 && scene.boxes().len() == objects {
+            break;
+        }
+    }
+    scene.boxes().to_vec()
+}
+
+#[test]
+fn random_boxes_of_every_small_count() {
+    let Some(gpus) = gpus() else { return };
+    let mut algorithms = every_algorithm(&gpus);
+    let mut random = Random(0x9e37_79b9_7f4a_7c15);
+    for count in [0, 1, 2, 3, 31, 32, 33, 63, 64, 65, 127, 128, 129, 255, 256, 257, 1000, 1023, 1024, 1025, 2049] {
+        assert_all_agree("a cube", &random.cubes(count, [8.0; 3], 0.7), &mut algorithms);
+    }
+}
+
+#[test]
+fn every_scenario() {
+    let Some(gpus) = gpus() else { return };
+    let mut algorithms = every_algorithm(&gpus);
+    for scenario in Scenario::ALL {
+        for objects in [33, 1000] {
+            assert_all_agree(&format!("{scenario} of {objects}"), &frame(scenario, objects), &mut algorithms);
+        }
+    }
+}
+
+#[test]
+fn worlds_of_every_shape() {
+    let Some(gpus) = gpus() else { return };
+    let mut algorithms = every_algorithm(&gpus);
+    let mut random = Random(7);
+    for world in WORLDS {
+        assert_all_agree("a world", &random.cubes(1500, world, 0.5), &mut algorithms);
+    }
+    assert_all_agree("a world of denormals", &denormals(&mut random), &mut algorithms);
+    assert_all_agree("a lattice", &lattice(), &mut algorithms);
+}
+
+#[test]
+fn large_infinite_and_far_boxes() {
+    let Some(gpus) = gpus() else { return };
+    let mut algorithms = every_algorithm(&gpus);
+    let mut boxes = large_boxes();
+    assert_all_agree("large boxes", &boxes, &mut algorithms);
+    let inf = f32::INFINITY;
+    boxes.push(Aabb::new([-inf; 3], [inf; 3]));
+    boxes.insert(0, Aabb::new([-inf, 0.0, 0.0], [inf, 1.0, 1.0]));
+    boxes.push(Aabb::new([5.0, -inf, 5.0], [5.0, inf, inf]));
+    boxes.push(Aabb::new([inf; 3], [inf; 3]));
+    boxes.push(Aabb::new([-inf; 3], [-inf; 3]));
+    boxes.push(Aabb::new([f32::MIN; 3], [f32::MAX; 3]));
+    boxes.push(Aabb::new([-0.0; 3], [0.0; 3]));
+    boxes.push(Aabb::new([0.0; 3], [-0.0; 3]));
+    for far in [1.0e6, -1.0e9, 3.0e38] {
+        boxes.push(Aabb::cube([far, 0.0, far], 0.5));
+        boxes.push(Aabb::cube([0.0, far, 0.0], 1.0));
+    }
+    assert_all_agree("infinite boxes", &boxes, &mut algorithms);
+    let lines: Vec<Aabb> = (0..600).map(|k| Aabb::new([-inf, k as f32, -inf], [inf, k as f32 + 1.0, inf])).collect();
+    assert_all_agree("infinite slabs", &lines, &mut algorithms);
+    assert_all_agree("identical points", &[Aabb::cube([3.0; 3], 0.0); 700], &mut algorithms);
+}
+
+#[test]
+fn the_limit_counts_the_pairs_that_pass_the_filter() {
+    let Some(gpus) = gpus() else { return };
+    let mut random = Random(13);
+    // The second scene has more pairs than the first list of a GPU has room for.
+    for boxes in [random.cubes(900, [11.0; 3], 0.7), random.cubes(1500, [9.0; 3], 1.2)] {
+        // The last five have no membership.
+        let memberships: Vec<Membership> = (0..boxes.len() - 5).map(|_| random.membership()).collect();
+        let expected = naive_filtered(&boxes, &memberships);
+        let is_fixed = |id: u32| memberships.get(id as usize).is_some_and(|m| m.fixed);
+        let all = naive(&boxes).iter().filter(|&&(i, j)| !(is_fixed(i) && is_fixed(j))).count();
+        let limit = expected.len() - 1;
+        for (id, mut algorithm) in every_algorithm(&gpus) {
+            let mut pairs = Pairs::with_order(PairOrder::Canonical);
+            pairs.set_filter(Some(Filter::new(memberships.clone())));
+            pairs.set_limit(Some(expected.len()));
+            algorithm.find_pairs(&boxes, &mut pairs).unwrap_or_else(|e| panic!("{id}: {e}"));
+            assert!(pairs.as_slice() == expected, "{id}: {} pairs, not {}", pairs.len(), expected.len());
+            assert_eq!(pairs.overlapping(), all as u64, "{id}");
+            pairs.set_limit(Some(limit));
+            assert_eq!(algorithm.find_pairs(&boxes, &mut pairs), Err(Error::TooManyPairs { limit }), "{id}");
+        }
+    }
+}
+
+#[test]
+fn the_first_invalid_box_is_named() {
+    let Some(gpus) = gpus() else { return };
+    let mut random = Random(11);
+    for (id, mut algorithm) in every_algorithm(&gpus) {
+        let mut pairs = Pairs::new();
+        for at in [0, 127, 1000, 1499] {
+            for (defect, bad) in [
+                (BoxDefect::NotANumber, Aabb::new([0.0, 0.0, f32::NAN], [1.0; 3])),
+                (BoxDefect::NotANumber, Aabb::new([f32::NAN; 3], [f32::NAN; 3])),
+                (BoxDefect::Inverted, Aabb::new([0.0, 2.0, 0.0], [1.0; 3])),
+                (BoxDefect::Inverted, Aabb::new([29.0; 3], [1.0; 3])),
+            ] {
+                let mut boxes = random.cubes(1500, [20.0; 3], 0.5);
+                boxes[at] = bad;
+                boxes[1499] = bad;
+                let error = algorithm.find_pairs(&boxes, &mut pairs).unwrap_err();
+                assert_eq!(error, Error::InvalidBox { index: at, defect }, "{id}");
+            }
+        }
+        let boxes = random.cubes(500, [10.0; 3], 0.5);
+        algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+        assert_eq!(pairs.len(), naive(&boxes).len(), "{id} after errors");
+    }
+}
+
+/// Two million pairs, or twelve with `long-tests`.
+#[test]
+fn millions_of_pairs_come_whole_and_a_limit_refuses_them() {
+    let Some(gpus) = gpus() else { return };
+    let objects: u64 = if cfg!(feature = "long-tests") { 5000 } else { 2000 };
+    let boxes: Vec<Aabb> = (0..objects).map(|k| Aabb::cube([k as f32 * 1e-4, 0.0, 0.0], 1.0)).collect();
+    for (id, mut algorithm) in every_algorithm(&gpus) {
+        let mut pairs = Pairs::new();
+        pairs.set_limit(Some(1000));
+        assert_eq!(algorithm.find_pairs(&boxes, &mut pairs), Err(Error::TooManyPairs { limit: 1000 }), "{id}");
+        pairs.set_limit(None);
+        for frame in 0..2 {
+            algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+            assert_eq!(pairs.len() as u64, objects * (objects - 1) / 2, "{id} in frame {frame}");
+            let sum: u64 = pairs.iter().map(|&(i, j)| u64::from(j) * u64::from(j > i)).sum();
+            assert_eq!(sum, (0..objects).map(|j| j * j).sum::<u64>(), "{id} in frame {frame}");
+        }
+    }
+}
+
+#[test]
+fn the_order_is_the_same_in_every_run() {
+    let Some(gpus) = gpus() else { return };
+    let boxes = frame(Scenario::Clustered, 2000);
+    let list = |algorithm: &mut dyn BroadPhase| {
+        let mut pairs = Pairs::new();
+        algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+        pairs.as_slice().to_vec()
+    };
+    let mut registry = Registry::with_cores(1);
+    sapwise_gpu::add_to(&mut registry, &gpus);
+    // If several GPUs share a frame, the order follows their measured speeds.
+    for id in on_gpus(&registry).into_iter().filter(|id| !id.to_string().contains('+')) {
+        let first = list(registry.create(&id).unwrap().as_mut());
+        for _ in 0..3 {
+            assert_eq!(list(registry.create(&id).unwrap().as_mut()), first, "{id}");
+        }
+    }
+}
+
+/// Frames that take a software adapter minutes.
+#[cfg(feature = "long-tests")]
+mod long {
+    use super::*;
+    use crate::common::swept;
+
+    #[test]
+    fn the_oracle_of_large_frames_is_the_double_loop() {
+        for scenario in Scenario::ALL {
+            for objects in [0, 1, 2, 33, 5000] {
+                let boxes = frame(scenario, objects);
+                assert!(swept(&boxes) == naive(&boxes), "{scenario} of {objects}");
+            }
+        }
+        assert!(swept(&lattice()) == naive(&lattice()) && swept(&large_boxes()) == naive(&large_boxes()));
+    }
+
+    /// The sizes at which blocks and tiles begin and end, without brute force at the large ones.
+    #[test]
+    fn every_scenario_at_the_edges_of_blocks() {
+        let Some(gpus) = gpus() else { return };
+        let mut algorithms = every_algorithm(&gpus);
+        let (mut fast, mut brute): (Algorithms, Algorithms) =
+            algorithms.drain(..).partition(|(id, _)| !id.contains("brute"));
+        for (k, scenario) in Scenario::ALL.into_iter().enumerate() {
+            for objects in [0, 1, 2, 31, 32, 33] {
+                let (name, boxes) = (format!("{scenario} of {objects}"), frame(scenario, objects));
+                assert_all_agree(&name, &boxes, &mut fast);
+                assert_all_agree(&name, &boxes, &mut brute);
+            }
+            // The hard scenarios come last. Their pairs are quadratic in the boxes: large ones would take minutes
+            // each.
+            let hard = scenario > Scenario::Fragmentation;
+            let large = if hard { 4097 + k } else { [65_535, 65_536, 65_537, 40_961 + 1009 * k][k % 4] };
+            let boxes = frame(scenario, large);
+            assert_all_find(&swept(&boxes), &format!("{scenario} of {large}"), &boxes, &mut fast);
+        }
+    }
+
+    /// For real GPUs: `tools/real-gpu.sh` runs it. A software adapter takes hours.
+    #[test]
+    #[ignore = "takes hours on a software adapter; tools/real-gpu.sh runs it"]
+    fn every_scenario_at_every_size() {
+        let Some(gpus) = gpus() else { return };
+        let mut algorithms = every_algorithm(&gpus);
+        for scenario in Scenario::ALL {
+            for objects in [0, 1, 2, 31, 32, 33, 1000, 65_535, 65_536, 65_537, 54_321] {
+                let boxes = frame(scenario, objects);
+                assert_all_find(&swept(&boxes), &format!("{scenario} of {objects}"), &boxes, &mut algorithms);
+            }
+            println!("{scenario}: {} algorithms agree with the oracle at 11 sizes", algorithms.len());
+        }
+    }
+
+    /// More candidates than one submission tests, and than the 65 535 turns after which lavapipe ends a loop silently.
+    #[test]
+    fn rows_of_very_many_candidates_lose_no_pair() {
+        let Some(gpus) = gpus() else { return };
+        let mut row: Vec<Aabb> = (0..70_000).map(|k| Aabb::cube([k as f32, (k % 7) as f32 * 3.0, 0.0], 0.4)).collect();
+        row.push(Aabb::new([-1.0, -1.0, -1.0], [80_000.0, 2.0, 1.0]));
+        let hits = (0..70_000_u32).filter(|k| k % 7 == 0).count();
+        // A software adapter on two slow cores takes a second for ten million tests, and counts as lost after a
+        // minute.
+        let point = [Aabb::cube([1.0; 3], 0.5); 12_000];
+        for (id, mut algorithm) in every_algorithm(&gpus).into_iter().filter(|(id, _)| !id.contains("brute")) {
+            let mut pairs = Pairs::with_order(PairOrder::Canonical);
+            algorithm.find_pairs(&row, &mut pairs).unwrap();
+            assert!(
+                pairs.len() == hits && pairs.iter().all(|&(i, j)| i % 7 == 0 && j == 70_000),
+                "{id}: {} pairs",
+                pairs.len()
+            );
+            // Quadratic, so once for each method and GPU.
+            if !id.contains('+') && !id.contains("twice") {
+                pairs.set_limit(Some(1000));
+                assert_eq!(algorithm.find_pairs(&point, &mut pairs), Err(Error::TooManyPairs { limit: 1000 }), "{id}");
+            }
+        }
+    }
+}

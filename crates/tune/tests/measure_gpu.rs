@@ -1,0 +1,112 @@
+//! The contract of every measurement of any GPU. No value is compared with a time: GPUs differ.
+//!
+//! Without a GPU these tests report that and pass; with `SAPWISE_REQUIRE_GPU=1` they fail.
+
+#[path = "../../../tests/common/mod.rs"]
+mod common;
+
+use common::gpus;
+use sapwise_gpu::Gpus;
+use sapwise_tune::{GpuKind, How, Parameter};
+use sapwise_tune::hardware::GpuParameterId;
+use sapwise_tune::measure::{self, Options};
+
+fn options(brief: bool) -> Options {
+    Options::default().brief(brief)
+}
+
+/// Checks the rules for a parameter on any machine.
+fn check(p: &Parameter) {
+    assert!(!p.source.is_empty() && p.source != "not measured", "{p:?}");
+    assert_eq!(p.value.is_none(), p.how == How::Missing, "{p:?}");
+    assert_eq!(p.samples == 0, p.how == How::Missing, "{p:?}");
+    assert!(p.value.is_none_or(|value| value.is_finite() && value >= 0.0), "{p:?}");
+    assert!(p.dispersion.is_none() || p.samples >= 4, "{p:?}");
+    assert!(p.foreign_load.is_none_or(|share| (0.0..=1.0).contains(&share)), "{p:?}");
+    // The value follows from the raw samples, which are few enough for a file.
+    let kept = p.how == How::Measured;
+    assert_eq!(p.raw.is_empty(), !kept, "{p:?}");
+    assert!(p.raw.len() <= 1000, "{p:?}");
+    assert!(!kept || p.recomputed() == p.value, "{p:?}");
+    if p.how == How::Reported {
+        assert_eq!((p.dispersion, p.spoiled, p.foreign_load), (None, 0, None), "{p:?}");
+    }
+}
+
+fn show(parameters: &[Parameter]) {
+    for p in parameters {
+        let (value, spread) = (p.value.unwrap_or(f64::NAN), p.dispersion.unwrap_or(f64::NAN));
+        let (name, foreign) = (&p.name, p.foreign_load.unwrap_or(0.0));
+        println!(
+            "{name:32} {value:>16.3}  ±{spread:.3}  n={:<4} foreign {foreign:.2}  {:?}: {}",
+            p.samples, p.how, p.source
+        );
+    }
+}
+
+#[test]
+fn every_parameter_once_and_in_order() {
+    let Some(gpus) = gpus() else { return };
+    for index in 0..gpus.len() as u32 {
+        let hardware = measure::gpu(&gpus, index, &options(true)).unwrap();
+        assert_eq!(Some(&hardware.gpu), gpus.identities().nth(index as usize));
+        let names: Vec<String> = hardware.parameters.iter().map(|p| p.name.clone()).collect();
+        assert_eq!(names, GpuParameterId::OF_ONE);
+        hardware.parameters.iter().for_each(check);
+        show(&hardware.parameters);
+        // Every driver allows these.
+        for name in [GpuParameterId::UploadGbPerS, GpuParameterId::RoundTripNs, GpuParameterId::ArithmeticGflopPerS] {
+            assert!(hardware.value(name).is_some_and(|value| value > 0.0), "{name}");
+        }
+        assert!(hardware.value(GpuParameterId::MemoryBytes).is_some_and(|bytes| bytes > 1e8));
+        if hardware.gpu.kind == GpuKind::Software {
+            for name in [GpuParameterId::ClockGhz, GpuParameterId::Processors, GpuParameterId::Lanes] {
+                let p = hardware.parameters.iter().find(|p| p.name == name).unwrap();
+                assert!(p.value.is_none() && p.source.contains("program on the CPU"), "{p:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn groups_of_gpus() {
+    let Some(gpus) = gpus() else { return };
+    assert!(measure::gpu_group(&gpus, &[0], &options(true)).is_err());
+    assert!(measure::gpu_group(&gpus, &[0, 0], &options(true)).is_err());
+    if gpus.len() < 2 {
+        println!("skipped: there is one GPU");
+        return;
+    }
+    let group = measure::gpu_group(&gpus, &[1, 0, 1], &options(true)).unwrap();
+    assert_eq!(group.gpus, [0, 1]);
+    assert_eq!(group.parameters.iter().map(|p| p.name.as_str()).collect::<Vec<_>>(), GpuParameterId::GROUP);
+    group.parameters.iter().for_each(check);
+    assert!(group.parameters.iter().all(|p| p.value.is_some_and(|value| value > 0.0)), "{group:?}");
+}
+
+#[test]
+fn a_gpu_that_is_not_there() {
+    assert!(measure::gpu(&Gpus::none(), 0, &options(true)).is_err());
+    assert!(measure::gpu_group(&Gpus::none(), &[0, 1], &options(true)).is_err());
+}
+
+/// Prints the values of this machine: `cargo test --features measure-gpu --test measure_gpu -- --ignored --nocapture`.
+#[test]
+#[ignore = "takes seconds for each GPU"]
+fn the_whole_measurement() {
+    let Some(gpus) = gpus() else { return };
+    for index in 0..gpus.len() as u32 {
+        let start = std::time::Instant::now();
+        let hardware = measure::gpu(&gpus, index, &options(false)).unwrap();
+        println!("\n{:?}, {:.2} s", hardware.gpu, start.elapsed().as_secs_f64());
+        show(&hardware.parameters);
+        hardware.parameters.iter().for_each(check);
+    }
+    if gpus.len() > 1 {
+        let all: Vec<u32> = (0..gpus.len() as u32).collect();
+        let start = std::time::Instant::now();
+        let group = measure::gpu_group(&gpus, &all, &options(false)).unwrap();
+        println!("\n{all:?}, {:.2} s", start.elapsed().as_secs_f64());
+        show(&group.parameters);
+    }
+}
