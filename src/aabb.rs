@@ -58,7 +58,8 @@ impl Aabb {
     }
 
     /// Returns an error for the first invalid box. `first` is the position of the first of `boxes`.
-    pub(crate) fn check(boxes: &[Self], first: usize) -> Result<(), Error> {
+    #[doc(hidden)]
+    pub fn check(boxes: &[Self], first: usize) -> Result<(), Error> {
         match boxes.iter().position(|b| b.defect().is_some()) {
             None => Ok(()),
             Some(at) => {

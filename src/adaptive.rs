@@ -30,8 +30,8 @@ use runner::Runner;
 use std::fmt;
 
 pub use decision::{Decision, Reason};
-pub(crate) use instances::Instances;
-pub(crate) use setup::{Arrival, Background, Start};
+pub use instances::Instances;
+pub use setup::{Arrival, Background, Start};
 pub use setup::{Origin, SaveError, Setup};
 
 /// Sizes of the slice that learned tuning shows: four a decade from ten to a million, in quarters of a decade.
@@ -61,7 +61,9 @@ impl Adaptive {
     }
 
     /// Over instances that are there already.
-    pub(crate) fn with(tuning: Tuning, made: Instances) -> Self {
+    #[doc(hidden)]
+    #[must_use]
+    pub fn with(tuning: Tuning, made: Instances) -> Self {
         Self {
             runner: Runner::new(tuning, made),
             start: Start::default(),
@@ -163,7 +165,8 @@ impl Adaptive {
     }
 
     /// Begins with what a start on this machine found.
-    pub(crate) fn set_start(&mut self, start: Start) {
+    #[doc(hidden)]
+    pub fn set_start(&mut self, start: Start) {
         self.runner.set_awaits(start.background.is_some());
         self.start = start;
     }

@@ -68,7 +68,8 @@ impl AlgorithmId {
     }
 
     /// Makes the id of a built-in method on the CPU.
-    pub(crate) fn cpu(method: &'static str, threads: u32) -> Self {
+    #[doc(hidden)]
+    pub fn cpu(method: &'static str, threads: u32) -> Self {
         Self { method: method.to_owned(), backend: Backend::Cpu(threads) }
     }
 

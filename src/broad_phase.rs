@@ -105,6 +105,6 @@ impl FrameWork {
 }
 
 /// Returns an error if 32 bits can't number `objects` boxes.
-pub(crate) fn check_count(objects: usize) -> Result<(), Error> {
+pub fn check_count(objects: usize) -> Result<(), Error> {
     if u32::try_from(objects).is_err() { Err(Error::TooManyObjects { objects }) } else { Ok(()) }
 }

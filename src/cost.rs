@@ -6,7 +6,7 @@ mod helpers;
 mod residual;
 mod term;
 
-use crate::Load;
+use crate::algorithm::Load;
 use std::cell::{Cell, OnceCell};
 use std::sync::Arc;
 

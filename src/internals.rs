@@ -9,6 +9,7 @@ pub use crate::cpu::{Threads, Workers};
 pub use crate::gpu_identity::{GpuIdentity, GpuKind};
 pub use crate::load::{SampledBoxes, SceneStats, StripGrid};
 pub use crate::pair::Pair;
+pub use crate::pairs::Parallel;
 pub use crate::tuning::corrected;
 pub use crate::{splitmix, stats};
 #[cfg(feature = "schema")]

@@ -50,8 +50,10 @@ mod pairs;
 mod registry;
 #[cfg(test)]
 mod scene;
-mod splitmix;
-mod stats;
+#[doc(hidden)]
+pub mod splitmix;
+#[doc(hidden)]
+pub mod stats;
 pub mod tuning;
 
 pub use aabb::Aabb;

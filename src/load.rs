@@ -9,11 +9,11 @@ mod strip_grid;
 use crate::aabb::Aabb;
 
 pub use displacement::Displacement;
-pub(crate) use displacement::{is_same_pace, paces_apart_ln};
+pub use displacement::{is_same_pace, paces_apart_ln};
 pub use plan::FramePlan;
-pub(crate) use sampled_boxes::SampledBoxes;
-pub(crate) use scene_stats::SceneStats;
-pub(crate) use strip_grid::{StripGrid, StripSpan};
+pub use sampled_boxes::SampledBoxes;
+pub use scene_stats::SceneStats;
+pub use strip_grid::{StripGrid, StripSpan};
 
 /// The counts of a frame that decide the cost of each algorithm, estimated from a sample and the previous frame.
 ///
@@ -32,7 +32,7 @@ pub struct Load {
     pub strip_candidates: f64,
     /// Overlapping pairs: those of the previous frame, or an estimate from the sample if there is none.
     pub pairs: f64,
-    /// Motion in a frame, 0 to 1, as [`Displacement::moved`](crate::Displacement::moved) returns it: the mean over a
+    /// Motion in a frame, 0 to 1, as [`Displacement::moved`](crate::algorithm::Displacement::moved) returns it: the mean over a
     /// sample of the greatest displacement of a bound since the previous frame, in mean edges of the box, at most 1
     /// each. 0: nothing moves. 1: no frame helps with the next, or the previous frame is unknown.
     pub moved: f64,
@@ -47,7 +47,7 @@ impl Load {
 
     /// Returns whether a frame of another load takes about as long. Each count may differ by `share` of itself plus
     /// `share` of the objects, because a box takes as long as some pairs.
-    pub(crate) fn is_within(&self, share: f64, other: &Self) -> bool {
+    pub fn is_within(&self, share: f64, other: &Self) -> bool {
         let objects = f64::from(self.objects);
         let counts = |l: &Self| [f64::from(l.objects), l.axis_candidates, l.strip_candidates, l.pairs];
         // False for NaN.
@@ -90,7 +90,7 @@ impl Load {
     }
 
     /// Estimates the load and the plan of a frame from the same sample.
-    pub(crate) fn planned(boxes: &[Aabb], pairs: Option<f64>, moved: Option<f64>) -> (Self, FramePlan) {
+    pub fn planned(boxes: &[Aabb], pairs: Option<f64>, moved: Option<f64>) -> (Self, FramePlan) {
         let sample = SampledBoxes::from(boxes);
         let (plan, stats, grid) = FramePlan::of_sample(&sample, boxes.len());
         let n = boxes.len() as f64;

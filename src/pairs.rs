@@ -11,7 +11,8 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 pub(crate) use fill::each_bit;
-pub(crate) use order::{Alone, Parallel, Sorter};
+pub use order::Parallel;
+pub(crate) use order::{Alone, Sorter};
 
 /// The order in which a caller wants the pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -177,7 +178,8 @@ impl Pairs {
     }
 
     /// Does the same as [`finish`](Self::finish), on several threads if that pays.
-    pub(crate) fn finish_on(&mut self, threads: &impl Parallel) -> Result<(), Error> {
+    #[doc(hidden)]
+    pub fn finish_on(&mut self, threads: &impl Parallel) -> Result<(), Error> {
         if let Some(elements) = self.refused {
             return Err(Error::OutOfMemory { what: "pairs", elements });
         }

@@ -180,7 +180,7 @@ impl Registry {
     /// rayon](crate::rayon1) that this library exports.
     ///
     /// ```
-    /// use sapwise::{Registry, rayon1 as rayon};
+    /// use sapwise::{rayon1 as rayon, Registry};
     /// use std::sync::Arc;
     ///
     /// let pool = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(3).build()?);
@@ -227,12 +227,14 @@ impl Registry {
     }
 
     /// Returns the SIMD level of the built-in algorithms.
-    pub(crate) fn simd(&self) -> SimdLevel {
+    #[doc(hidden)]
+    pub fn simd(&self) -> SimdLevel {
         self.simd
     }
 
     /// Returns the kind of helper threads, in a word.
-    pub(crate) fn helpers(&self) -> &'static str {
+    #[doc(hidden)]
+    pub fn helpers(&self) -> &'static str {
         self.threads.kind()
     }
 

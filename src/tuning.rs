@@ -17,9 +17,9 @@ use slice::Slice;
 use std::sync::Arc;
 
 pub use crate::cost::{CostCurve, CostTerm, Product, Term};
-pub(crate) use corrected::corrected;
+pub use corrected::corrected;
 pub use crossover::Crossover;
-pub(crate) use error::TuningError;
+pub use error::TuningError;
 
 /// [`Tuning::usual`] runs `k` threads from this times `k`² objects. A frame of `n` objects on `k` threads takes `a n
 /// / k + b k`, where `b` wakes one thread and waits for it. So `k` threads beat half as many from `n = (b / 2a) k²`

@@ -140,7 +140,7 @@ impl Instance {
 }
 
 /// What runs the algorithms of some tuning, and why the last of those that can't run can't.
-pub(crate) struct Instances {
+pub struct Instances {
     /// In the order of [`Tuning::algorithms`].
     pub(super) candidates: Vec<Candidate>,
     pub(super) instances: Vec<Instance>,
@@ -160,12 +160,12 @@ impl Instances {
     }
 
     /// Why none of the algorithms can run; `None` where one can.
-    pub(crate) fn failure(&mut self) -> Option<Error> {
+    pub fn failure(&mut self) -> Option<Error> {
         if self.instances.is_empty() { Some(self.failure.take().unwrap_or(Error::NoAlgorithm)) } else { None }
     }
 
     /// Makes the algorithms of a tuning, those that differ in their number of threads only as one where they can be.
-    pub(crate) fn of(tuning: &Tuning, registry: &Registry) -> Self {
+    pub fn of(tuning: &Tuning, registry: &Registry) -> Self {
         let ids = tuning.algorithms();
         let mut made = Self {
             candidates: ids.iter().map(|&id| Candidate { id: id.clone(), instance: None }).collect(),

@@ -78,22 +78,22 @@ impl std::error::Error for SaveError {
 }
 
 /// Writes a tuning to the cache.
-pub(crate) type Save = Box<dyn Fn(&Tuning) -> Result<(), SaveError> + Send + Sync>;
+pub type Save = Box<dyn Fn(&Tuning) -> Result<(), SaveError> + Send + Sync>;
 
 /// What an [`Adaptive`](super::Adaptive) keeps of its start.
 #[derive(Default)]
-pub(crate) struct Start {
-    pub(crate) setup: Setup,
-    pub(crate) save: Option<Save>,
-    pub(crate) background: Option<Background>,
+pub struct Start {
+    pub setup: Setup,
+    pub save: Option<Save>,
+    pub background: Option<Background>,
 }
 
 /// The result of a start.
-pub(crate) struct Arrival {
-    pub(crate) setup: Setup,
-    pub(crate) save: Option<Save>,
+pub struct Arrival {
+    pub setup: Setup,
+    pub save: Option<Save>,
     /// The tuning with its algorithms; `None`: the usual tuning stays.
-    pub(crate) tuning: Option<(Tuning, Instances)>,
+    pub tuning: Option<(Tuning, Instances)>,
 }
 
 impl Start {
@@ -121,9 +121,9 @@ impl Start {
 }
 
 /// The thread that measures while frames run. It is told to stop when the [`Adaptive`](super::Adaptive) is dropped.
-pub(crate) struct Background {
-    pub(crate) thread: Option<JoinHandle<Arrival>>,
-    pub(crate) stop: Arc<AtomicBool>,
+pub struct Background {
+    pub thread: Option<JoinHandle<Arrival>>,
+    pub stop: Arc<AtomicBool>,
 }
 
 impl Background {

@@ -5,7 +5,7 @@ mod warming;
 use super::load_tracker::LoadTracker;
 use super::*;
 use crate::scene::{Scenario, Scene};
-use crate::{AlgorithmCost, CostCurve, CostTerm, Term};
+use crate::tuning::{AlgorithmCost, CostCurve, CostTerm, Term};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 

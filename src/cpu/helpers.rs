@@ -76,7 +76,7 @@ impl Helpers {
 ///
 /// # Errors
 /// [`Unavailable::ThreadsRefused`].
-pub(crate) fn pinned_pool(threads: u32) -> Result<rayon::ThreadPool, Unavailable> {
+pub fn pinned_pool(threads: u32) -> Result<rayon::ThreadPool, Unavailable> {
     build_pool(threads, CpuPlacement::choose(threads as usize).map(Arc::new), 0)
 }
 

@@ -19,11 +19,11 @@ mod threads;
 mod tree;
 mod workers;
 
-pub(crate) use helpers::pinned_pool;
+pub use helpers::pinned_pool;
 pub(crate) use level::Simd;
 pub use level::{SimdLevel, SimdLevelError};
-pub(crate) use threads::Threads;
-pub(crate) use workers::Workers;
+pub use threads::Threads;
+pub use workers::Workers;
 
 use crate::broad_phase::BroadPhase;
 use crate::error::Error;

@@ -12,10 +12,10 @@ use std::{
 /// One rayon pool for each number of helpers, made on first use and shared by all algorithms; or the program's own pool
 /// for all.
 #[derive(Debug, Default)]
-pub(crate) struct Threads {
+pub struct Threads {
     /// Whether the threads of pools made from now on are pinned; see
     /// [`Registry::pin_threads`](crate::Registry::pin_threads).
-    pub(crate) pinned: bool,
+    pub pinned: bool,
     #[cfg(feature = "parallel")]
     pools: Mutex<BTreeMap<u32, Arc<Helpers>>>,
     /// The program's pool, with the number of its threads; see [`Registry::use_pool`](crate::Registry::use_pool).
@@ -25,19 +25,19 @@ pub(crate) struct Threads {
 
 impl Threads {
     /// Makes pools whose threads are pinned.
-    pub(crate) fn pinned() -> Self {
+    pub fn pinned() -> Self {
         Self { pinned: true, ..Self::default() }
     }
 
     /// Takes a program's pool. Its threads run where the program has them.
     #[cfg(feature = "parallel")]
-    pub(crate) fn of(pool: Arc<rayon::ThreadPool>) -> Self {
+    pub fn of(pool: Arc<rayon::ThreadPool>) -> Self {
         let threads = u32::try_from(pool.current_num_threads()).unwrap_or(u32::MAX);
         Self { given: Some((threads, Arc::new(Helpers::of(pool)))), ..Self::default() }
     }
 
     /// Returns what these threads are: `pinned`, `free`, or `given` by the program.
-    pub(crate) fn kind(&self) -> &'static str {
+    pub fn kind(&self) -> &'static str {
         match (&self.given, self.pinned && crate::cpu::placement::may_pin()) {
             (Some(_), _) => "given",
             (None, true) => "pinned",
@@ -46,7 +46,7 @@ impl Threads {
     }
 
     /// Returns the most threads of an algorithm, its caller among them, if the program's pool bounds them.
-    pub(crate) fn most(&self) -> Option<u32> {
+    pub fn most(&self) -> Option<u32> {
         #[cfg(feature = "parallel")]
         return self.given.as_ref().map(|(threads, _)| threads.saturating_add(1));
         #[cfg(not(feature = "parallel"))]
@@ -54,7 +54,7 @@ impl Threads {
     }
 
     /// Returns why an algorithm can't have `threads` threads, or `None` if it can.
-    pub(crate) fn unavailable(&self, threads: u32) -> Option<Unavailable> {
+    pub fn unavailable(&self, threads: u32) -> Option<Unavailable> {
         if threads > 1 && !cfg!(feature = "parallel") {
             return Some(Unavailable::NotParallel);
         }
@@ -67,7 +67,7 @@ impl Threads {
     /// # Errors
     /// [`Unavailable::ThreadsRefused`].
     #[cfg(feature = "parallel")]
-    pub(crate) fn helpers(&self, count: u32) -> Result<Arc<Helpers>, Unavailable> {
+    pub fn helpers(&self, count: u32) -> Result<Arc<Helpers>, Unavailable> {
         if let Some((_, given)) = &self.given {
             return Ok(Arc::clone(given));
         }

@@ -18,7 +18,7 @@ use std::sync::{Mutex, PoisonError};
 
 /// The threads of one algorithm: the calling one, and its helpers from a pool.
 #[derive(Debug)]
-pub(crate) struct Workers {
+pub struct Workers {
     threads: usize,
     tasks: usize,
     #[cfg(feature = "parallel")]
@@ -43,7 +43,7 @@ const SMALLEST_JOIN: usize = 16_384;
 
 impl Workers {
     /// Makes `threads` threads for the algorithm `method`.
-    pub(crate) fn new(method: &'static str, threads: u32, pools: &Threads) -> Result<Self, Error> {
+    pub fn new(method: &'static str, threads: u32, pools: &Threads) -> Result<Self, Error> {
         #[cfg(not(feature = "parallel"))]
         let _ = (method, pools);
         Ok(Self {
@@ -59,18 +59,18 @@ impl Workers {
         })
     }
 
-    pub(crate) fn threads(&self) -> usize {
+    pub fn threads(&self) -> usize {
         self.threads
     }
 
     /// Returns the best number of tasks of a phase: one if there is one thread.
-    pub(crate) fn tasks(&self) -> usize {
+    pub fn tasks(&self) -> usize {
         self.tasks
     }
 
     /// Returns as many of these threads as a frame of `boxes` boxes keeps busy, with as many tasks. A method that takes
     /// more or less time for a box than `grid-sap` passes the number of boxes for which `grid-sap` takes as long.
-    pub(crate) fn fit(&self, boxes: usize) -> Self {
+    pub fn fit(&self, boxes: usize) -> Self {
         let threads = self.threads.min(boxes / BOXES_PER_THREAD).max(1);
         Self {
             threads,
@@ -84,7 +84,7 @@ impl Workers {
     ///
     /// The caller works instead of sleeping: waking a thread takes tens of microseconds, which a frame would pay twice.
     #[cfg_attr(not(feature = "parallel"), expect(clippy::unused_self, reason = "without threads nobody helps"))]
-    pub(crate) fn each_of<I: Iterator<Item: Send> + Send>(&self, tasks: I, work: impl Fn(I::Item) + Sync) {
+    pub fn each_of<I: Iterator<Item: Send> + Send>(&self, tasks: I, work: impl Fn(I::Item) + Sync) {
         #[cfg(feature = "parallel")]
         // A single task needs no help.
         if let (Some(helpers), most @ 2..) = (&self.helpers, tasks.size_hint().1.unwrap_or(usize::MAX)) {
@@ -96,12 +96,12 @@ impl Workers {
     }
 
     /// Runs one phase: `work` on every task.
-    pub(crate) fn each<T: Send>(&self, tasks: &mut [T], work: impl Fn(usize, &mut T) + Sync) {
+    pub fn each<T: Send>(&self, tasks: &mut [T], work: impl Fn(usize, &mut T) + Sync) {
         self.each_of(tasks.iter_mut().enumerate(), |(k, task)| work(k, task));
     }
 
     /// Runs one phase: `work` on every task and its element of `with`.
-    pub(crate) fn each_with<T: Send, U: Send>(
+    pub fn each_with<T: Send, U: Send>(
         &self,
         tasks: &mut [T],
         with: &mut [U],
@@ -111,7 +111,7 @@ impl Workers {
     }
 
     /// Runs one phase: `work` on every task and its parts of two lists, each given with the length of a part.
-    pub(crate) fn each_share<T: Send, A: Send, B: Send>(
+    pub fn each_share<T: Send, A: Send, B: Send>(
         &self,
         tasks: &mut [T],
         (a, a_len): (&mut [A], usize),
@@ -123,7 +123,7 @@ impl Workers {
     }
 
     /// Runs one phase: `fill` on parts of the columns, each with its first position.
-    pub(crate) fn fill(&self, columns: ColumnsMut<'_>, fill: impl Fn(usize, ColumnsMut<'_>) + Sync) {
+    pub fn fill(&self, columns: ColumnsMut<'_>, fill: impl Fn(usize, ColumnsMut<'_>) + Sync) {
         #[cfg(feature = "parallel")]
         if self.helpers.is_some() {
             let size = self.part_of(columns.len());
@@ -144,7 +144,7 @@ impl Workers {
     }
 
     /// Runs one phase: writes `make` of every input, with its position, to `out`.
-    pub(crate) fn map<I: Sync, T: Send>(&self, inputs: &[I], out: &mut [T], make: impl Fn(usize, &I) -> T + Sync) {
+    pub fn map<I: Sync, T: Send>(&self, inputs: &[I], out: &mut [T], make: impl Fn(usize, &I) -> T + Sync) {
         let size = self.part_of(inputs.len());
         self.each_of(out.chunks_mut(size).zip(inputs.chunks(size)).enumerate(), |(k, (out, inputs))| {
             out.iter_mut().zip(inputs).zip(k * size..).for_each(|((o, i), at)| *o = make(at, i));
@@ -157,7 +157,7 @@ impl Workers {
     }
 
     /// Runs one phase: returns the error for the first invalid box, if there is one.
-    pub(crate) fn check(&self, boxes: &[Aabb]) -> Result<(), Error> {
+    pub fn check(&self, boxes: &[Aabb]) -> Result<(), Error> {
         #[cfg(feature = "parallel")]
         if self.helpers.is_some() {
             let size = self.part_of(boxes.len());
@@ -188,7 +188,7 @@ impl Parallel for Workers {
 
 /// The pairs that the tasks find.
 #[derive(Debug, Default)]
-pub(crate) struct Outputs {
+pub struct Outputs {
     /// One list for each task.
     lists: Vec<Pairs>,
     /// Whether a list has exceeded the limit in this frame.
@@ -210,7 +210,7 @@ impl Outputs {
 
     /// Lets `find` fill one list for each task of `workers`, then joins them in order. With one thread the one list is
     /// the caller's.
-    pub(crate) fn collect(
+    pub fn collect(
         &mut self,
         workers: &Workers,
         pairs: &mut Pairs,
@@ -247,7 +247,7 @@ impl Outputs {
 
     /// Runs one phase: `find` on every part, each into its own list, then joins the lists in order. `find` gets the
     /// number of the part and the number of parts.
-    pub(crate) fn find(
+    pub fn find(
         &mut self,
         workers: &Workers,
         pairs: &mut Pairs,

@@ -32,12 +32,12 @@ pub enum GpuErrorKind {
 
 impl GpuError {
     /// An error without a source.
-    pub(crate) fn new(kind: GpuErrorKind, text: impl Into<String>) -> Self {
+    pub fn new(kind: GpuErrorKind, text: impl Into<String>) -> Self {
         Self { kind, text: text.into(), source: None }
     }
 
     /// An error with what the driver or the device said.
-    pub(crate) fn caused(
+    pub fn caused(
         kind: GpuErrorKind,
         text: impl Into<String>,
         source: impl std::error::Error + Send + Sync + 'static,
@@ -46,7 +46,7 @@ impl GpuError {
     }
 
     /// The same with another text, unless the GPU is gone: then it does not matter what it was to do.
-    pub(crate) fn of(self, text: impl Into<String>) -> Self {
+    pub fn of(self, text: impl Into<String>) -> Self {
         match self.kind {
             GpuErrorKind::Lost | GpuErrorKind::Inert => self,
             _ => Self { text: text.into(), ..self },

@@ -25,16 +25,16 @@ impl FramePlan {
     }
 
     /// Returns the plan with this motion.
-    pub(crate) fn with_moved(self, moved: Option<f64>) -> Self {
+    pub fn with_moved(self, moved: Option<f64>) -> Self {
         Self { moved, ..self }
     }
 
     /// Returns the plan with about this many overlapping pairs.
-    pub(crate) fn with_pairs(self, pairs: Option<f64>) -> Self {
+    pub fn with_pairs(self, pairs: Option<f64>) -> Self {
         Self { pairs, ..self }
     }
 
-    /// Returns the motion in a frame, [`Displacement::moved`](crate::Displacement::moved) of this frame or of a recent
+    /// Returns the motion in a frame, [`Displacement::moved`](crate::algorithm::Displacement::moved) of this frame or of a recent
     /// one; `None` if unknown.
     #[must_use]
     pub fn moved(&self) -> Option<f64> {
@@ -48,12 +48,12 @@ impl FramePlan {
     }
 
     /// Returns the statistics of this frame.
-    pub(crate) fn stats(&self, boxes: &[Aabb]) -> SceneStats {
+    pub fn stats(&self, boxes: &[Aabb]) -> SceneStats {
         self.stats.map_or_else(|| SceneStats::of(boxes), |(stats, _)| stats)
     }
 
     /// Returns the grid for this frame.
-    pub(crate) fn grid(&self, boxes: &[Aabb]) -> StripGrid {
+    pub fn grid(&self, boxes: &[Aabb]) -> StripGrid {
         self.stats.map_or_else(|| StripGrid::plan(&SceneStats::of(boxes), boxes.len()), |(_, grid)| grid)
     }
 }

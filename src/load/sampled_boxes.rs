@@ -5,25 +5,25 @@ use crate::splitmix::mix;
 
 /// Most boxes of a sample. 256 boxes have 32 640 pairs: if 1 % of them overlap on an axis, the sample shows that to
 /// about 10 %.
-pub(super) const MOST: usize = 256;
+pub const MOST: usize = 256;
 
 /// Fewest boxes of a sample: the quantile of the extents needs a few.
 const FEWEST: usize = 32;
 
 /// Up to 256 boxes of a frame, without invalid ones: the sample is taken before the input is checked.
-pub(crate) struct SampledBoxes {
+pub struct SampledBoxes {
     boxes: [Aabb; MOST],
     count: usize,
 }
 
 impl SampledBoxes {
     /// Samples a frame.
-    pub(crate) fn from(boxes: &[Aabb]) -> Self {
+    pub fn from(boxes: &[Aabb]) -> Self {
         Self::among(boxes.len(), |k| &boxes[k])
     }
 
     /// Samples `count` boxes, of which `of` returns number k.
-    pub(super) fn among<'a>(count: usize, of: impl Fn(usize) -> &'a Aabb) -> Self {
+    pub fn among<'a>(count: usize, of: impl Fn(usize) -> &'a Aabb) -> Self {
         let mut sample = Self { boxes: [Aabb::default(); MOST], count: 0 };
         // Twice the root of the count: the sample costs a small share of the frame at every size, and the share of
         // overlapping pairs, which falls with the count, stays countable.
@@ -49,7 +49,7 @@ impl SampledBoxes {
     }
 
     /// Takes the first 256 of boxes that were sampled elsewhere.
-    pub(crate) fn given(boxes: &[Aabb]) -> Self {
+    pub fn given(boxes: &[Aabb]) -> Self {
         let mut sample = Self { boxes: [Aabb::default(); MOST], count: 0 };
         for b in boxes.iter().filter(|b| b.defect().is_none()).take(MOST) {
             sample.boxes[sample.count] = *b;
@@ -58,13 +58,13 @@ impl SampledBoxes {
         sample
     }
 
-    pub(crate) fn as_slice(&self) -> &[Aabb] {
+    pub fn as_slice(&self) -> &[Aabb] {
         &self.boxes[..self.count]
     }
 
     /// Returns the share of all pairs whose intervals meet on every axis. `interval` returns the intervals of a box,
     /// ends included.
-    pub(crate) fn share_of_pairs<const N: usize, T: PartialOrd + Copy + Default>(
+    pub fn share_of_pairs<const N: usize, T: PartialOrd + Copy + Default>(
         &self,
         interval: impl Fn(&Aabb) -> [(T, T); N],
     ) -> f64 {

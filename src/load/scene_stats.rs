@@ -13,34 +13,34 @@ const CLAMP: f64 = 1.0e30;
 
 /// Statistics of a frame: ranks and counts, which a few boxes anywhere in space don't change.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct SceneStats {
+pub struct SceneStats {
     /// Start and length of the range in which most centres lie, on each axis.
     ranges: [(f64, f64); 3],
     /// The 0.9 quantile of the extents on each axis.
-    pub(crate) extent: [f64; 3],
+    pub extent: [f64; 3],
     /// Share of all pairs that overlap on each axis.
-    pub(crate) shares: [f64; 3],
+    pub shares: [f64; 3],
 }
 
 impl SceneStats {
     /// Estimates the statistics from a sample of the boxes.
-    pub(crate) fn of(boxes: &[Aabb]) -> Self {
+    pub fn of(boxes: &[Aabb]) -> Self {
         Self::of_sample(&SampledBoxes::from(boxes))
     }
 
     /// Estimates the statistics of the boxes at these positions.
-    pub(crate) fn of_members(boxes: &[Aabb], members: &[u32]) -> Self {
+    pub fn of_members(boxes: &[Aabb], members: &[u32]) -> Self {
         Self::of_sample(&SampledBoxes::among(members.len(), |k| &boxes[members[k] as usize]))
     }
 
     /// Returns start and length of the range that cells of a grid on this axis share: that of most boxes. The cells at
     /// the ends take the boxes beyond.
-    pub(crate) fn range(&self, axis: usize) -> (f64, f64) {
+    pub fn range(&self, axis: usize) -> (f64, f64) {
         self.ranges[axis]
     }
 
     /// Returns the axis on which the fewest pairs overlap: a sweep along it has the fewest candidates.
-    pub(crate) fn sweep_axis(&self) -> usize {
+    pub fn sweep_axis(&self) -> usize {
         // The sample of a large world may hold no overlapping pair. Then take the axis on which boxes are shortest for
         // their range.
         let order = |a: usize| (self.shares[a], self.extent[a] / self.ranges[a].1);
@@ -48,7 +48,7 @@ impl SceneStats {
     }
 
     /// Computes the statistics of a sample.
-    pub(crate) fn of_sample(sample: &SampledBoxes) -> Self {
+    pub fn of_sample(sample: &SampledBoxes) -> Self {
         let boxes = sample.as_slice();
         let mut stats = Self::default();
         let (count, tail) = (boxes.len(), boxes.len() / TAIL);

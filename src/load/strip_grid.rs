@@ -19,9 +19,9 @@ const LARGE_LENGTHS: f64 = 16.0;
 
 /// Maps boxes to strips. All choices come from a sample: a bad one costs speed, never a pair.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct StripGrid {
+pub struct StripGrid {
     /// The sweep axis.
-    pub(crate) axis: usize,
+    pub axis: usize,
     /// The two grid axes.
     across: [usize; 2],
     origin: [f32; 2],
@@ -35,11 +35,11 @@ pub(crate) struct StripGrid {
 
 /// The strips of a box, packed: the first strip, and the number of further cells on each grid axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct StripSpan(u32);
+pub struct StripSpan(u32);
 
 impl StripSpan {
     /// No strip: the box is oversized.
-    pub(crate) const APART: Self = Self(u32::MAX);
+    pub const APART: Self = Self(u32::MAX);
 }
 
 /// Most further cells on an axis that fit into a span.
@@ -47,7 +47,7 @@ const MOST_MORE: u32 = 0x7f;
 
 impl StripGrid {
     /// Makes a grid for `objects` boxes with these statistics.
-    pub(crate) fn plan(stats: &SceneStats, objects: usize) -> Self {
+    pub fn plan(stats: &SceneStats, objects: usize) -> Self {
         let axis = stats.sweep_axis();
         let across = [(axis + 1) % 3, (axis + 2) % 3];
         let range = across.map(|a| stats.range(a));
@@ -78,18 +78,18 @@ impl StripGrid {
     }
 
     /// Returns the number of cells on the two grid axes.
-    pub(crate) fn cells(&self) -> [u32; 2] {
+    pub fn cells(&self) -> [u32; 2] {
         self.cells
     }
 
     /// Returns the number of strips.
-    pub(crate) fn strips(&self) -> usize {
+    pub fn strips(&self) -> usize {
         (self.cells[0] * self.cells[1]) as usize
     }
 
     /// Returns the first and the last cell of a box on each grid axis. Cell numbers stay below 2^16, which `f32`
     /// represents exactly.
-    pub(super) fn cells_of(&self, b: &Aabb) -> [(f32, f32); 2] {
+    pub fn cells_of(&self, b: &Aabb) -> [(f32, f32); 2] {
         let bound =
             |d: usize, v: f32| ((v - self.origin[d]) * self.inverse_width[d]).max(0.0).min(self.last[d]).floor();
         [0, 1].map(|d| (bound(d, b.min[self.across[d]]), bound(d, b.max[self.across[d]])))
@@ -97,7 +97,7 @@ impl StripGrid {
 
     /// Returns the strips of a box. `AXIS` is the sweep axis of the grid.
     #[inline(always)]
-    pub(crate) fn span<const AXIS: usize>(&self, b: &Aabb) -> StripSpan {
+    pub fn span<const AXIS: usize>(&self, b: &Aabb) -> StripSpan {
         let [u, v] = [(AXIS + 1) % 3, (AXIS + 2) % 3];
         let large = (b.max[AXIS] - b.min[AXIS] > self.large[0])
             | (b.max[u] - b.min[u] > self.large[1])
@@ -120,7 +120,7 @@ impl StripGrid {
     /// On each grid axis, two boxes that share several strips first meet in the cell in which the later of them begins.
     /// So exactly one strip has both bits set in either box: it reports the pair.
     #[inline(always)]
-    pub(crate) fn each_strip(&self, span: StripSpan, mut f: impl FnMut(usize, u32)) {
+    pub fn each_strip(&self, span: StripSpan, mut f: impl FnMut(usize, u32)) {
         let StripSpan(packed) = span;
         let first = (packed & 0xffff) as usize;
         if packed <= 0xffff {

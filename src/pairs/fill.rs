@@ -126,7 +126,8 @@ impl Pairs {
     }
 
     /// Appends the wanted ones of pairs that stand lower member first.
-    pub(crate) fn extend(&mut self, pairs: &[[u32; 2]]) -> Result<(), Error> {
+    #[doc(hidden)]
+    pub fn extend(&mut self, pairs: &[[u32; 2]]) -> Result<(), Error> {
         if self.filter.is_none() {
             self.reserve(self.len + pairs.len())?;
         }
@@ -144,7 +145,8 @@ impl Pairs {
     /// Returns whether a wanted pair could not be stored in this list. Then the frame has no answer, and the search may
     /// stop.
     #[inline]
-    pub(crate) fn is_over(&self) -> bool {
+    #[doc(hidden)]
+    pub fn is_over(&self) -> bool {
         self.over
     }
 
@@ -156,7 +158,8 @@ impl Pairs {
 
     /// Notes that there are more wanted pairs than can be stored.
     #[cold]
-    pub(crate) fn exceed(&mut self) {
+    #[doc(hidden)]
+    pub fn exceed(&mut self) {
         self.over = true;
         if let Some(over) = &self.any_over {
             over.store(true, Relaxed);
@@ -164,13 +167,15 @@ impl Pairs {
     }
 
     /// Returns whether `more` pairs are surely too many: false if there is a filter, which may drop them.
-    pub(crate) fn is_too_small_for(&self, more: u64) -> bool {
+    #[doc(hidden)]
+    pub fn is_too_small_for(&self, more: u64) -> bool {
         self.filter.is_none() && self.limit.is_some_and(|limit| self.len as u64 + more > limit as u64)
     }
 
     /// Begins a list that takes a part of the pairs of `whole`, under the same limit and filter. All parts share
     /// `any_over`, which is `false`.
-    pub(crate) fn begin_part(&mut self, whole: &Pairs, any_over: &Arc<AtomicBool>) {
+    #[doc(hidden)]
+    pub fn begin_part(&mut self, whole: &Pairs, any_over: &Arc<AtomicBool>) {
         self.clear();
         self.any_over = Some(Arc::clone(any_over));
         self.limit = whole.limit;
@@ -178,7 +183,8 @@ impl Pairs {
     }
 
     /// Releases the filter: while it is shared, a change by the caller would copy it.
-    pub(crate) fn end_part(&mut self) {
+    #[doc(hidden)]
+    pub fn end_part(&mut self) {
         self.set_filter(None);
     }
 
@@ -191,7 +197,8 @@ impl Pairs {
     }
 
     /// Appends a part: its pairs, its counts and its errors.
-    pub(crate) fn append(&mut self, part: &Pairs) {
+    #[doc(hidden)]
+    pub fn append(&mut self, part: &Pairs) {
         self.refused = self.refused.or(part.refused);
         let fits = self.limit.map_or(part.len, |l| part.len.min(l.saturating_sub(self.len)));
         self.unwanted += part.unwanted;

@@ -78,7 +78,7 @@ fn no_file_starts_more_threads_than_there_are_cores() {
         // Nor as a family.
         assert!(registry.create_family(&[&"pair-cache@cpu1".parse().unwrap(), &id]).unwrap().is_none());
         // Nor does a tuning of steps.
-        let step = |from_objects, id: &str| crate::Step { from_objects, algorithm: id.parse().unwrap() };
+        let step = |from_objects, id: &str| crate::tuning::Step { from_objects, algorithm: id.parse().unwrap() };
         let tuning = crate::Tuning::from_steps(vec![step(0, text), step(20, "brute@cpu1")]).unwrap();
         let mut adaptive = crate::Adaptive::new(tuning, &registry).unwrap();
         adaptive.find_pairs(&[Aabb::cube([0.0; 3], 1.0)], &mut Pairs::new()).unwrap();

@@ -35,7 +35,7 @@ const SIZE: usize = CURVE + 1;
 const FEWEST_FRAMES: f64 = 16.0;
 
 /// Where boxes move e times as far as before, or an e-th of that, an e-th stays of what was observed of keeping. Less than the
-/// second is the noise of [`Displacement`](crate::Displacement), which watches few boxes.
+/// second is the noise of [`Displacement`](crate::algorithm::Displacement), which watches few boxes.
 const PACE_LN: f64 = 1.0;
 const SAME_PACE_LN: f64 = 0.5;
 

@@ -2,7 +2,8 @@
 
 use super::belief::{Belief, Deviations};
 use crate::cost::{Frame, FrameCost};
-use crate::{AlgorithmCost, Load};
+use crate::algorithm::Load;
+use crate::tuning::AlgorithmCost;
 
 /// Returns the costs corrected by timings: for each the position of its algorithm in `costs`, the load, the nanoseconds
 /// of a frame and the standard deviation of their natural logarithm.

@@ -4,7 +4,10 @@
 
 use super::{AlgorithmCost, Crossover, Source, Step, Tuning, TuningError};
 use crate::cost::{CostTerm, Fallback, Helpers, Places, Residual};
-use crate::{AlgorithmId, CostCurve, Load, Work};
+use crate::AlgorithmId;
+use crate::algorithm::Load;
+use crate::cost::Work;
+use crate::tuning::CostCurve;
 use std::sync::Arc;
 
 /// Which algorithm to run under which load.

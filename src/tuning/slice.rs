@@ -1,7 +1,7 @@
 //! Finds where the cheapest algorithm changes along a line of loads.
 
 use super::AlgorithmCost;
-use crate::Load;
+use crate::algorithm::Load;
 use crate::cost::Frame;
 
 /// Distance between two loads that are compared, as a logarithm of objects. A narrower field may be missed.
@@ -153,7 +153,8 @@ fn between(a: &Load, b: &Load, share: f64) -> Load {
 mod tests {
     use super::*;
     use crate::splitmix;
-    use crate::{CostCurve, CostTerm, Places, Residual, Term};
+    use crate::cost::{Places, Residual};
+    use crate::tuning::{CostCurve, CostTerm, Term};
     use std::sync::Arc;
 
     fn draw(state: &mut u64) -> f64 {

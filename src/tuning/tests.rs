@@ -1,5 +1,5 @@
 use super::*;
-use crate::{CostTerm, Term};
+use crate::tuning::{CostTerm, Term};
 
 fn cost(id: &str, terms: &[(Term, f64)], spread_ln: f64) -> AlgorithmCost {
     let terms = terms.iter().map(|&(term, unit_ns)| CostTerm { term, unit_ns }).collect();

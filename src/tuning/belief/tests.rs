@@ -1,5 +1,8 @@
 use super::*;
-use crate::{AlgorithmId, CostCurve, CostTerm, Helpers, Load, Term};
+use crate::AlgorithmId;
+use crate::algorithm::Load;
+use crate::cost::Helpers;
+use crate::tuning::{CostCurve, CostTerm, Term};
 
 fn cost(id: &str, unit_ns: f64) -> AlgorithmCost {
     let id: AlgorithmId = id.parse().unwrap();
