@@ -1,10 +1,10 @@
 //! What one decision costs: the ranking alone, and the whole of `Adaptive::decide` with its sampled estimate.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use sapwise::{Adaptive, BroadPhase, Pairs, Registry, Tuning};
 use sapwise::algorithm::Load;
-use sapwise_tune::{Hardware, Machine, Model, Parameter, ParameterId};
+use sapwise::{Adaptive, BroadPhase, Pairs, Registry, Tuning};
 use sapwise_scenes::Scenario;
+use sapwise_tune::{Hardware, Machine, Model, Parameter, ParameterId};
 use std::hint::black_box;
 
 /// What the built-in model predicts for a machine of 16 cores.

@@ -17,8 +17,8 @@
 //! Criterion can't interleave its candidates. Without `--bench`, which `cargo bench` passes, only the smallest size is
 //! run. Exit status 1 if a contestant failed or found other pairs.
 
-use sapwise::{Aabb, AlgorithmId, BroadPhase, Pairs, Registry};
 use sapwise::algorithm::{Backend, usable_cores};
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Pairs, Registry};
 use sapwise_gpu::{Gpu, Gpus, Resident, ResidentPairs, wgpu30 as wgpu};
 use sapwise_scenes::Scenario;
 use std::hint::black_box;

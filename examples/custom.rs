@@ -6,9 +6,9 @@
 //!
 //! The cost here is a guess, which its frames correct. `probes/examples/own_algorithm.rs` measures one.
 
-use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Pairs, Registry, Tuning};
 use sapwise::algorithm::Load;
 use sapwise::tuning::{AlgorithmCost, CostCurve, CostTerm, Product, Source, Term};
+use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Pairs, Registry, Tuning};
 use sapwise_scenes::Scenario;
 
 /// Its name in tunings, reports and decisions.

@@ -4,8 +4,8 @@
 //! cargo run --release --example instructions -- uniform portable
 //! ```
 
-use sapwise::{Aabb, AlgorithmId, BroadPhase, Pairs, Registry};
 use sapwise::algorithm::SimdLevel;
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Pairs, Registry};
 use sapwise_scenes::Scenario;
 use std::error::Error;
 

@@ -64,10 +64,7 @@ impl Adaptive {
     #[doc(hidden)]
     #[must_use]
     pub fn with(tuning: Tuning, made: Instances) -> Self {
-        Self {
-            runner: Runner::new(tuning, made),
-            start: Start::default(),
-        }
+        Self { runner: Runner::new(tuning, made), start: Start::default() }
     }
 
     /// Runs one algorithm always.

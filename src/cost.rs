@@ -35,7 +35,6 @@ pub struct CostCurve {
 
 /// The cost of a method on one thread of a machine or on some of its GPUs: a sum of terms times the exponential of a residual.
 #[derive(Debug, Clone, PartialEq, Default)]
-#[non_exhaustive]
 pub struct Work {
     /// Terms of the sum; none is negative.
     pub terms: Vec<CostTerm>,
@@ -156,7 +155,9 @@ impl Work {
     }
 
     /// Returns what makes it unusable, if anything.
-    pub(crate) fn defect(&self) -> Option<CurveError> {
+    #[doc(hidden)]
+    #[must_use]
+    pub fn defect(&self) -> Option<CurveError> {
         if let Some(t) = self.terms.iter().find(|t| !(0.0..=MOST_UNIT_NS).contains(&t.unit_ns)) {
             return Some(CurveError::Unit { term: t.term, unit_ns: t.unit_ns });
         }

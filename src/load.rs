@@ -9,11 +9,12 @@ mod strip_grid;
 use crate::aabb::Aabb;
 
 pub use displacement::Displacement;
-pub use displacement::{is_same_pace, paces_apart_ln};
+pub(crate) use displacement::{is_same_pace, paces_apart_ln};
 pub use plan::FramePlan;
 pub use sampled_boxes::SampledBoxes;
 pub use scene_stats::SceneStats;
-pub use strip_grid::{StripGrid, StripSpan};
+pub use strip_grid::StripGrid;
+pub(crate) use strip_grid::StripSpan;
 
 /// The counts of a frame that decide the cost of each algorithm, estimated from a sample and the previous frame.
 ///

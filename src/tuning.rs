@@ -8,10 +8,10 @@ mod error;
 mod file;
 mod slice;
 
-use crate::cost::Frame;
-use crate::named;
 use crate::algorithm::{AlgorithmId, Load};
+use crate::cost::Frame;
 use crate::cost::Residual;
+use crate::named;
 use crate::registry::Registry;
 use slice::Slice;
 use std::sync::Arc;

@@ -4,9 +4,11 @@ mod common;
 
 use common::{Random, every_algorithm, naive};
 use proptest::prelude::*;
-use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Changes, Error, Filter, Membership, PairOrder, Pairs, Registry, Tuning};
 use sapwise::internals::Pair;
 use sapwise::tuning::Step;
+use sapwise::{
+    Aabb, Adaptive, AlgorithmId, BroadPhase, Changes, Error, Filter, Membership, PairOrder, Pairs, Registry, Tuning,
+};
 use std::collections::BTreeSet;
 
 /// Boxes with ids. Some are added, some removed, and all move.

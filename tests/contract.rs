@@ -3,9 +3,9 @@
 mod common;
 
 use common::{Random, WORLDS, denormals, every_algorithm, large_boxes, lattice, naive};
-use sapwise::{Aabb, BroadPhase, Error, PairOrder, Pairs};
 use sapwise::algorithm::SimdLevel;
 use sapwise::error::BoxDefect;
+use sapwise::{Aabb, BroadPhase, Error, PairOrder, Pairs};
 use sapwise_scenes::Scenario;
 
 fn assert_all_agree(name: &str, boxes: &[Aabb], algorithms: &mut [(String, Box<dyn BroadPhase>)]) {

@@ -6,8 +6,8 @@ mod custom;
 
 use common::naive;
 use custom::{ID, cost, registry, tuning};
-use sapwise::{Aabb, Adaptive, BroadPhase, Error, PairOrder, Pairs, Reason, Registry};
 use sapwise::tuning::Term;
+use sapwise::{Aabb, Adaptive, BroadPhase, Error, PairOrder, Pairs, Reason, Registry};
 use sapwise_scenes::Scenario;
 use std::time::Duration;
 

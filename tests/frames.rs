@@ -3,8 +3,8 @@
 mod common;
 
 use common::{Random, naive};
-use sapwise::{Aabb, BroadPhase, Error, PairOrder, Pairs, Registry};
 use sapwise::algorithm::SimdLevel;
+use sapwise::{Aabb, BroadPhase, Error, PairOrder, Pairs, Registry};
 
 /// Returns every method on one and on three threads at every SIMD level of this machine.
 fn every_algorithm() -> Vec<(String, Box<dyn BroadPhase>)> {

@@ -8,9 +8,9 @@
 mod common;
 
 use common::{every_algorithm, naive};
-use sapwise::{Aabb, BroadPhase, PairOrder, Pairs};
 use sapwise::algorithm::SimdLevel;
 use sapwise::internals::Pair;
+use sapwise::{Aabb, BroadPhase, PairOrder, Pairs};
 use sapwise_scenes::Scenario;
 use std::fmt::Write;
 

@@ -3,9 +3,9 @@
 mod common;
 
 use common::{Random, naive};
-use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, PairOrder, Pairs, Registry, Tuning};
 use sapwise::algorithm::Backend;
-use sapwise::rayon1::{ThreadPool, ThreadPoolBuilder, self as rayon};
+use sapwise::rayon1::{self as rayon, ThreadPool, ThreadPoolBuilder};
+use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, PairOrder, Pairs, Registry, Tuning};
 use sapwise_scenes::Scenario;
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::Duration;

@@ -1,9 +1,9 @@
 //! Properties that hold for any boxes.
 
 use proptest::prelude::*;
-use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, PairOrder, Pairs, Registry, Tuning};
 use sapwise::algorithm::{Displacement, Load};
 use sapwise::tuning::Step;
+use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, PairOrder, Pairs, Registry, Tuning};
 
 /// Bounds that meet often, with infinities, zeros of both signs and denormals among them.
 fn bound() -> impl Strategy<Value = f32> {

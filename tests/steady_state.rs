@@ -2,9 +2,11 @@
 //!
 //! One test only, because the counter sees every thread of the process.
 
-use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Changes, Error, Filter, Membership, PairOrder, Pairs, Registry, Tuning};
 use sapwise::algorithm::Load;
 use sapwise::tuning::{AlgorithmCost, CostCurve, CostTerm, Source, Term};
+use sapwise::{
+    Aabb, Adaptive, AlgorithmId, BroadPhase, Changes, Error, Filter, Membership, PairOrder, Pairs, Registry, Tuning,
+};
 use sapwise_scenes::Scenario;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Arc;

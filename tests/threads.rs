@@ -1,7 +1,7 @@
 //! The types that threads may share, and the pinning of helper threads.
 
-use sapwise::{Adaptive, BroadPhase, Changes, Error, Pairs, Registry, Tuning};
 use sapwise::algorithm::Load;
+use sapwise::{Adaptive, BroadPhase, Changes, Error, Pairs, Registry, Tuning};
 use sapwise_tune::Model;
 
 #[test]

@@ -2,11 +2,11 @@
 
 use crate::settings::Settings;
 use rayon::ThreadPool;
-use sapwise::{Registry, Tuning};
 use sapwise::tuning::Source;
-use sapwise_tune::{Hardware, Model};
+use sapwise::{Registry, Tuning};
 use sapwise_tune::hardware::ParameterId;
 use sapwise_tune::measure::{self, Options};
+use sapwise_tune::{Hardware, Model};
 use std::process::Command;
 use std::sync::Arc;
 

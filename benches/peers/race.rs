@@ -4,8 +4,8 @@ use crate::contestants::Contestant;
 use crate::point::{Lane, Point};
 use crate::settings::Settings;
 use sapwise::{Aabb, Pairs};
-use sapwise_tune::measure::Watch;
 use sapwise_scenes::{Random, Scenario, Scene};
+use sapwise_tune::measure::Watch;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 

@@ -10,10 +10,10 @@
 //!
 //! The manifest of a program outside this repository needs `sapwise` and `sapwise-cli`.
 
-use sapwise::{Aabb, BroadPhase, Error, Pairs};
 use sapwise::tuning::{Product, Term};
-use sapwise_tune::model::Scale;
+use sapwise::{Aabb, BroadPhase, Error, Pairs};
 use sapwise_cli::{Command, UserAlgorithm};
+use sapwise_tune::model::Scale;
 use std::process::ExitCode;
 
 /// Visible to the test of this example, which is a command with the same `main`.

@@ -1,9 +1,9 @@
 //! The algorithms of the command: those of the library, and those that a user's program adds.
 
 use crate::revisions;
-use sapwise::{AlgorithmId, BroadPhase, Error, Registry};
 use sapwise::algorithm::{Backend, BackendClass};
 use sapwise::tuning::Term;
+use sapwise::{AlgorithmId, BroadPhase, Error, Registry};
 use sapwise_tune::model::Scale;
 use std::sync::Arc;
 

@@ -5,8 +5,8 @@ use crate::gpus::{self, GpuChoice};
 use crate::interrupt;
 use crate::progress::Progress;
 use sapwise::algorithm::usable_cores;
-use sapwise_tune::{Hardware, Parameter};
 use sapwise_tune::measure::{self, Family, Options};
+use sapwise_tune::{Hardware, Parameter};
 
 /// Measures the parameters of the CPU on at most `threads` cores, in under five seconds, then the GPUs that are
 /// taken.

@@ -6,16 +6,16 @@ use crate::check::doubts;
 use crate::progress::Progress;
 use crate::{interrupt, output, revisions};
 use anyhow::bail;
-use sapwise::{Registry, Tuning};
 use sapwise::algorithm::{Load, usable_cores};
-use sapwise_tune::{GpuIdentity, Hardware, Model};
-use sapwise_tune::hardware::ParameterId;
+use sapwise::{Registry, Tuning};
 use sapwise_lab::StoredModel;
 use sapwise_lab::data::{Document, read_document, usual_scenario};
 use sapwise_lab::fit::measured_tuning;
 use sapwise_lab::report::Report;
 use sapwise_lab::sweep::loads;
 use sapwise_scenes::Scenario;
+use sapwise_tune::hardware::ParameterId;
+use sapwise_tune::{GpuIdentity, Hardware, Model};
 use std::path::Path;
 
 /// Sizes of the slice that the tuning shows, in quarters of a decade: from ten objects to a million.

@@ -6,8 +6,8 @@ use crate::date;
 use crate::gpus::uses;
 use sapwise::algorithm::{Entry, SimdLevel, usable_cores};
 use sapwise::internals::stats::median;
-use sapwise_tune::{GpuKind, Hardware};
 use sapwise_lab::report::{Label, Point, Provenance, Restricted, Restriction, Timed, TimedTerm};
+use sapwise_tune::{GpuKind, Hardware};
 use std::time::Duration;
 
 /// Share of the CPU that other programs take at half of the points of a contended machine.
@@ -122,8 +122,8 @@ mod tests {
     use crate::args::{Arguments, Verb};
     use clap::Parser;
     use sapwise::algorithm::Load;
-    use sapwise_tune::{GpuHardware, GpuIdentity, Machine};
     use sapwise_lab::report::Timing;
+    use sapwise_tune::{GpuHardware, GpuIdentity, Machine};
 
     fn probe(words: &[&str]) -> Probe {
         let all = ["sapwise", "probe"].iter().chain(words);

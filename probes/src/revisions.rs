@@ -1,9 +1,9 @@
 //! Whether what a file says about algorithms holds for this build.
 
-use sapwise::{AlgorithmId, Registry, Tuning};
 use sapwise::algorithm::BackendClass;
-use sapwise_tune::{GpuIdentity, GpuKind, Model};
+use sapwise::{AlgorithmId, Registry, Tuning};
 use sapwise_lab::Report;
+use sapwise_tune::{GpuIdentity, GpuKind, Model};
 
 /// Returns why the timings of a report do not hold for this build, one sentence for each method.
 pub(crate) fn stale_in_report(report: &Report, registry: &Registry) -> Vec<String> {

@@ -7,13 +7,13 @@ use crate::terminal::Terminal;
 use sapwise::Tuning;
 use sapwise::algorithm::Backend;
 use sapwise::tuning::Crossover;
-use sapwise_tune::{GpuHardware, GpuIdentity, Hardware, How, Model, Parameter};
-use sapwise_tune::hardware::with_unit;
 use sapwise_lab::data::usual_scenario;
 use sapwise_lab::fit::measured_tuning;
 use sapwise_lab::label_text;
 use sapwise_lab::report::{Label, Report};
 use sapwise_lab::text::{columns, count, grouped};
+use sapwise_tune::hardware::with_unit;
+use sapwise_tune::{GpuHardware, GpuIdentity, Hardware, How, Model, Parameter};
 use std::path::Path;
 
 /// Describes the hardware, then the tuning of every scenario of the sweep.

@@ -33,7 +33,9 @@ fn made_up(folder: &Path, name: &str, change: impl Fn(&mut Value)) -> PathBuf {
     let of_this_build = [registry.entries(), &sapwise_gpu::algorithms([&any])].concat();
     for algorithm in report["algorithms"].as_array_mut().unwrap() {
         let id: sapwise::AlgorithmId = algorithm["id"].as_str().unwrap().parse().unwrap();
-        let same = |e: &&sapwise::algorithm::Entry| e.id.method() == id.method() && e.id.backend().class() == id.backend().class();
+        let same = |e: &&sapwise::algorithm::Entry| {
+            e.id.method() == id.method() && e.id.backend().class() == id.backend().class()
+        };
         if let Some(revision) = of_this_build.iter().find(same).map(|e| e.revision) {
             algorithm["revision"] = revision.into();
         }

@@ -5,8 +5,8 @@ mod common;
 #[cfg(all(unix, feature = "long-tests"))]
 use common::{TERMINATED, send};
 use common::{failure, sapwise, success};
-use sapwise_tune::ParameterId;
 use sapwise_lab::report::Report;
+use sapwise_tune::ParameterId;
 use std::fs;
 use std::path::Path;
 

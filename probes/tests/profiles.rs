@@ -76,7 +76,8 @@ fn after_an_interrupt_the_same_command_continues() {
     assert!(!success(tiny(folder.path()).arg("--dry-run")).contains("complete"));
     label("real_full");
     let before = fs::read(&full).unwrap();
-    let lower = sapwise::algorithm::SimdLevel::ALL.into_iter().rev().find(|&l| l < sapwise::algorithm::SimdLevel::detected());
+    let lower =
+        sapwise::algorithm::SimdLevel::ALL.into_iter().rev().find(|&l| l < sapwise::algorithm::SimdLevel::detected());
     let second = lower.map_or("full-again".to_owned(), |level| level.to_string());
     until(&format!("{second}.json"));
     assert_eq!(fs::read(&full).unwrap(), before, "a complete report was replaced");

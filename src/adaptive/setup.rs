@@ -78,19 +78,24 @@ impl std::error::Error for SaveError {
 }
 
 /// Writes a tuning to the cache.
-pub type Save = Box<dyn Fn(&Tuning) -> Result<(), SaveError> + Send + Sync>;
+pub(super) type Save = Box<dyn Fn(&Tuning) -> Result<(), SaveError> + Send + Sync>;
 
 /// What an [`Adaptive`](super::Adaptive) keeps of its start.
 #[derive(Default)]
 pub struct Start {
+    /// How the tuning came about.
     pub setup: Setup,
+    /// Saves what was learned; `None` without a cache.
     pub save: Option<Save>,
+    /// The thread that still measures.
     pub background: Option<Background>,
 }
 
 /// The result of a start.
 pub struct Arrival {
+    /// How the tuning came about.
     pub setup: Setup,
+    /// Saves what was learned; `None` without a cache.
     pub save: Option<Save>,
     /// The tuning with its algorithms; `None`: the usual tuning stays.
     pub tuning: Option<(Tuning, Instances)>,
@@ -122,7 +127,9 @@ impl Start {
 
 /// The thread that measures while frames run. It is told to stop when the [`Adaptive`](super::Adaptive) is dropped.
 pub struct Background {
+    /// The thread; `None` once it was joined.
     pub thread: Option<JoinHandle<Arrival>>,
+    /// Set when it is to stop.
     pub stop: Arc<AtomicBool>,
 }
 

@@ -15,7 +15,7 @@ use crate::aabb::Aabb;
 use crate::cpu::columns::{Columns, PADDING};
 use crate::cpu::level::Simd;
 use crate::pair::Pair;
-use crate::pairs::{each_bit, Pairs};
+use crate::pairs::{Pairs, each_bit};
 use std::ops::Range;
 
 /// The vectors of [`SimdLevel::Portable`]: those that every CPU of the target has.

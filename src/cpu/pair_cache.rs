@@ -13,7 +13,7 @@ mod motion;
 mod tree;
 
 use crate::aabb::Aabb;
-use crate::broad_phase::{BroadPhase, check_count, FrameKind, FrameWork};
+use crate::broad_phase::{BroadPhase, FrameKind, FrameWork, check_count};
 use crate::cpu::Threads;
 use crate::cpu::columns::part;
 use crate::cpu::kernel::{overlap, prefetch};

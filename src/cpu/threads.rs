@@ -67,7 +67,7 @@ impl Threads {
     /// # Errors
     /// [`Unavailable::ThreadsRefused`].
     #[cfg(feature = "parallel")]
-    pub fn helpers(&self, count: u32) -> Result<Arc<Helpers>, Unavailable> {
+    pub(crate) fn helpers(&self, count: u32) -> Result<Arc<Helpers>, Unavailable> {
         if let Some((_, given)) = &self.given {
             return Ok(Arc::clone(given));
         }

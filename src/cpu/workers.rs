@@ -59,6 +59,7 @@ impl Workers {
         })
     }
 
+    /// Returns the number of threads, the calling one included.
     pub fn threads(&self) -> usize {
         self.threads
     }
@@ -123,7 +124,7 @@ impl Workers {
     }
 
     /// Runs one phase: `fill` on parts of the columns, each with its first position.
-    pub fn fill(&self, columns: ColumnsMut<'_>, fill: impl Fn(usize, ColumnsMut<'_>) + Sync) {
+    pub(crate) fn fill(&self, columns: ColumnsMut<'_>, fill: impl Fn(usize, ColumnsMut<'_>) + Sync) {
         #[cfg(feature = "parallel")]
         if self.helpers.is_some() {
             let size = self.part_of(columns.len());
@@ -188,7 +189,7 @@ impl Parallel for Workers {
 
 /// The pairs that the tasks find.
 #[derive(Debug, Default)]
-pub struct Outputs {
+pub(crate) struct Outputs {
     /// One list for each task.
     lists: Vec<Pairs>,
     /// Whether a list has exceeded the limit in this frame.
@@ -210,7 +211,7 @@ impl Outputs {
 
     /// Lets `find` fill one list for each task of `workers`, then joins them in order. With one thread the one list is
     /// the caller's.
-    pub fn collect(
+    pub(crate) fn collect(
         &mut self,
         workers: &Workers,
         pairs: &mut Pairs,
@@ -247,7 +248,7 @@ impl Outputs {
 
     /// Runs one phase: `find` on every part, each into its own list, then joins the lists in order. `find` gets the
     /// number of the part and the number of parts.
-    pub fn find(
+    pub(crate) fn find(
         &mut self,
         workers: &Workers,
         pairs: &mut Pairs,

@@ -14,7 +14,7 @@ const STILL: f64 = 0.01;
 
 /// Returns the distance of two speeds, in edges a frame: the absolute logarithm of their ratio, about 0 if boxes count
 /// as still at both.
-pub fn paces_apart_ln(one: f64, other: f64) -> f64 {
+pub(crate) fn paces_apart_ln(one: f64, other: f64) -> f64 {
     ((one + STILL) / (other + STILL)).ln().abs()
 }
 
@@ -22,7 +22,7 @@ pub fn paces_apart_ln(one: f64, other: f64) -> f64 {
 const SAME_PACE_LN: f64 = 0.25;
 
 /// Returns whether two results of [`Displacement::moved`] may stand for the same speed.
-pub fn is_same_pace(one: f64, other: f64) -> bool {
+pub(crate) fn is_same_pace(one: f64, other: f64) -> bool {
     paces_apart_ln(one, other) < SAME_PACE_LN
 }
 

@@ -5,7 +5,7 @@ use crate::splitmix::mix;
 
 /// Most boxes of a sample. 256 boxes have 32 640 pairs: if 1 % of them overlap on an axis, the sample shows that to
 /// about 10 %.
-pub const MOST: usize = 256;
+pub(super) const MOST: usize = 256;
 
 /// Fewest boxes of a sample: the quantile of the extents needs a few.
 const FEWEST: usize = 32;
@@ -58,6 +58,7 @@ impl SampledBoxes {
         sample
     }
 
+    /// Returns the sampled boxes.
     pub fn as_slice(&self) -> &[Aabb] {
         &self.boxes[..self.count]
     }

@@ -53,6 +53,7 @@ impl Keyed for u32 {
 
 /// The threads that sort.
 pub trait Parallel {
+    /// Returns the number of threads, the calling one included.
     fn threads(&self) -> usize;
     /// Runs `work` on every task, and returns when all are done.
     fn each_of<I: Iterator<Item: Send> + Send>(&self, tasks: I, work: impl Fn(I::Item) + Sync);

@@ -1,8 +1,8 @@
 //! Predicted costs, corrected by timings.
 
 use super::belief::{Belief, Deviations};
-use crate::cost::{Frame, FrameCost};
 use crate::algorithm::Load;
+use crate::cost::{Frame, FrameCost};
 use crate::tuning::AlgorithmCost;
 
 /// Returns the costs corrected by timings: for each the position of its algorithm in `costs`, the load, the nanoseconds

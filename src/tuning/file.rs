@@ -3,10 +3,10 @@
 //! Algorithms of a method share their [`Work`], and all residuals share their [`Places`]. A file holds each once.
 
 use super::{AlgorithmCost, Crossover, Source, Step, Tuning, TuningError};
-use crate::cost::{CostTerm, Fallback, Helpers, Places, Residual};
 use crate::AlgorithmId;
 use crate::algorithm::Load;
 use crate::cost::Work;
+use crate::cost::{CostTerm, Fallback, Helpers, Places, Residual};
 use crate::tuning::CostCurve;
 use std::sync::Arc;
 

@@ -152,8 +152,8 @@ fn between(a: &Load, b: &Load, share: f64) -> Load {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::splitmix;
     use crate::cost::{Places, Residual};
+    use crate::splitmix;
     use crate::tuning::{CostCurve, CostTerm, Term};
     use std::sync::Arc;
 

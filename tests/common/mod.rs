@@ -1,9 +1,9 @@
 //! Shared by the test programs of the contract.
 #![allow(dead_code, reason = "each test program uses a part of this")]
 
-use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Membership, Registry};
 use sapwise::algorithm::SimdLevel;
 use sapwise::internals::Pair;
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Membership, Registry};
 
 /// The oracle: the definition of overlap, in a double loop.
 pub(crate) fn naive(boxes: &[Aabb]) -> Vec<Pair> {

@@ -85,7 +85,8 @@ impl Gpu {
     }
 
     /// Begins to record commands. Errors of other calls, until the commands are submitted, count as theirs.
-    pub(crate) fn record(&self) -> Recording {
+    #[doc(hidden)]
+    pub fn record(&self) -> Recording {
         Recording::new(&self.shared.device)
     }
 
@@ -93,13 +94,15 @@ impl Gpu {
     ///
     /// # Errors
     /// The device refuses it, or was lost.
-    pub(crate) fn submit(&self, recording: Recording) -> Result<wgpu::SubmissionIndex, GpuError> {
+    #[doc(hidden)]
+    pub fn submit(&self, recording: Recording) -> Result<wgpu::SubmissionIndex, GpuError> {
         self.check()?;
         recording.submit(&self.shared.queue).map_err(|e| self.refusal("the device refuses", e))
     }
 
     /// Asks the device to map a part of a buffer. Only `done` gets the result.
-    pub(crate) fn map(
+    #[doc(hidden)]
+    pub fn map(
         &self,
         slice: wgpu::BufferSlice<'_>,
         mode: wgpu::MapMode,
@@ -111,7 +114,8 @@ impl Gpu {
     }
 
     /// Unmaps a buffer. If the device was lost this fails, and the next submission reports it.
-    pub(crate) fn unmap(&self, buffer: &wgpu::Buffer) {
+    #[doc(hidden)]
+    pub fn unmap(&self, buffer: &wgpu::Buffer) {
         let scope = Scope::of_one(&self.shared.device, wgpu::ErrorFilter::Validation);
         buffer.unmap();
         let _ = scope.end();
@@ -183,7 +187,8 @@ impl Gpu {
 
     /// Marks the GPU as one that executes nothing, and returns why it can no longer be used: this, or an earlier
     /// fault.
-    pub(crate) fn inert(&self) -> GpuError {
+    #[doc(hidden)]
+    pub fn inert(&self) -> GpuError {
         let GpuIdentity { index, name, .. } = self.identity();
         let text = format!(
             "gpu{index} ({name}) executes nothing: its driver reports work as done, but no kernel ran; \

@@ -132,8 +132,9 @@ mod tests {
 
     /// Returns 256 uniformly random places, sorted.
     fn evenly(seed: u64, length: f64) -> Vec<f32> {
-        let mut list: Vec<f32> =
-            (0..256).map(|k| (sapwise::internals::splitmix::mix(seed << 32 | k) as f64 / u64::MAX as f64 * length) as f32).collect();
+        let mut list: Vec<f32> = (0..256)
+            .map(|k| (sapwise::internals::splitmix::mix(seed << 32 | k) as f64 / u64::MAX as f64 * length) as f32)
+            .collect();
         list.sort_unstable_by(f32::total_cmp);
         list
     }

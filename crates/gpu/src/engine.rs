@@ -22,10 +22,10 @@ use super::search::{Inputs, Search};
 use super::sorted::{Kind, MOST_OF_BOX, Sorted};
 use super::storage::{Storage, largest};
 use super::transfer::Transfer;
+use bytemuck::{bytes_of, cast_slice};
 use sapwise::Aabb;
 use sapwise::error::{GpuError, GpuErrorKind};
 use sapwise::internals::SampledBoxes;
-use bytemuck::{bytes_of, cast_slice};
 
 /// Bytes of a box.
 const BOX: u64 = size_of::<Aabb>() as u64;

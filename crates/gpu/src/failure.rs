@@ -1,7 +1,7 @@
 //! Why a frame on a GPU failed.
 
-use sapwise::{AlgorithmId, Error};
 use sapwise::error::{GpuError, GpuErrorKind, Unavailable};
+use sapwise::{AlgorithmId, Error};
 
 /// Tells a failure of the GPU, after which the frame can run elsewhere, from one of the frame.
 #[derive(Debug, Clone, PartialEq)]

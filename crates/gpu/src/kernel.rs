@@ -5,14 +5,14 @@ use sapwise::error::GpuError;
 
 /// An entry point of a shader, compiled for one GPU.
 #[derive(Debug)]
-pub(crate) struct Kernel {
+pub struct Kernel {
     pipeline: wgpu::ComputePipeline,
     label: &'static str,
 }
 
 /// A kernel with the buffers that it works on.
 #[derive(Debug)]
-pub(crate) struct Bound {
+pub struct Bound {
     pipeline: wgpu::ComputePipeline,
     /// `None` if the kernel uses no buffer.
     group: Option<wgpu::BindGroup>,
@@ -21,9 +21,9 @@ pub(crate) struct Bound {
 }
 
 /// The shaders. Each is a concatenation of files, because WGSL has no includes.
-pub(super) mod source {
+pub(crate) mod source {
     /// The files of a shader, in order.
-    pub(in crate) type Source = &'static [&'static str];
+    pub(crate) type Source = &'static [&'static str];
 
     const COMMON: &str = include_str!("shaders/common.wgsl");
     const INPUT: &str = include_str!("shaders/input.wgsl");
@@ -36,19 +36,17 @@ pub(super) mod source {
     const LEVELS: &str = include_str!("shaders/levels.wgsl");
     const WALK: &str = include_str!("shaders/walk.wgsl");
 
-    pub(in crate) const BRUTE: Source = &[COMMON, INPUT, PREFIX, include_str!("shaders/brute.wgsl")];
-    pub(in crate) const KEYS: Source =
-        &[COMMON, INPUT, DIVISION, CURVE, include_str!("shaders/keys.wgsl"), DIGITS];
-    pub(in crate) const CELLS: Source = &[COMMON, PREFIX, include_str!("shaders/cells.wgsl")];
-    pub(in crate) const GATHER: Source = &[COMMON, INPUT, include_str!("shaders/gather.wgsl")];
-    pub(in crate) const SAMPLE: Source = &[COMMON, INPUT, include_str!("shaders/sample.wgsl")];
-    pub(in crate) const SCAN: Source = &[COMMON, include_str!("shaders/scan.wgsl")];
-    pub(in crate) const SORT: Source = &[COMMON, PREFIX, include_str!("shaders/sort.wgsl"), DIGITS];
-    pub(in crate) const GRID_SAP: Source =
-        &[COMMON, PREFIX, ROWS, LEVELS, WALK, include_str!("shaders/grid_sap.wgsl")];
-    pub(in crate) const BVH: Source = &[COMMON, PREFIX, ROWS, LEVELS, WALK, include_str!("shaders/bvh.wgsl")];
-    pub(in crate) const SAP: Source = &[COMMON, PREFIX, ROWS, include_str!("shaders/sap.wgsl")];
-    pub(in crate) const TREE: Source = &[COMMON, LEVELS, include_str!("shaders/tree.wgsl")];
+    pub(crate) const BRUTE: Source = &[COMMON, INPUT, PREFIX, include_str!("shaders/brute.wgsl")];
+    pub(crate) const KEYS: Source = &[COMMON, INPUT, DIVISION, CURVE, include_str!("shaders/keys.wgsl"), DIGITS];
+    pub(crate) const CELLS: Source = &[COMMON, PREFIX, include_str!("shaders/cells.wgsl")];
+    pub(crate) const GATHER: Source = &[COMMON, INPUT, include_str!("shaders/gather.wgsl")];
+    pub(crate) const SAMPLE: Source = &[COMMON, INPUT, include_str!("shaders/sample.wgsl")];
+    pub(crate) const SCAN: Source = &[COMMON, include_str!("shaders/scan.wgsl")];
+    pub(crate) const SORT: Source = &[COMMON, PREFIX, include_str!("shaders/sort.wgsl"), DIGITS];
+    pub(crate) const GRID_SAP: Source = &[COMMON, PREFIX, ROWS, LEVELS, WALK, include_str!("shaders/grid_sap.wgsl")];
+    pub(crate) const BVH: Source = &[COMMON, PREFIX, ROWS, LEVELS, WALK, include_str!("shaders/bvh.wgsl")];
+    pub(crate) const SAP: Source = &[COMMON, PREFIX, ROWS, include_str!("shaders/sap.wgsl")];
+    pub(crate) const TREE: Source = &[COMMON, LEVELS, include_str!("shaders/tree.wgsl")];
 }
 
 impl Kernel {
@@ -73,12 +71,7 @@ impl Kernel {
     ///
     /// # Errors
     /// As [`new`](Self::new).
-    pub(crate) fn compile(
-        gpu: &Gpu,
-        text: String,
-        entry: &'static str,
-        constants: &[(&str, f64)],
-    ) -> Result<Self, GpuError> {
+    pub fn compile(gpu: &Gpu, text: String, entry: &'static str, constants: &[(&str, f64)]) -> Result<Self, GpuError> {
         // SAFETY: with all checks, any text is safe.
         unsafe { Self::make(gpu, text, entry, constants, wgpu::ShaderRuntimeChecks::checked()) }
     }
@@ -118,7 +111,7 @@ impl Kernel {
     ///
     /// # Errors
     /// They are not those of the shader.
-    pub(crate) fn bind(&self, gpu: &Gpu, buffers: &[(u32, &wgpu::Buffer)]) -> Result<Bound, GpuError> {
+    pub fn bind(&self, gpu: &Gpu, buffers: &[(u32, &wgpu::Buffer)]) -> Result<Bound, GpuError> {
         let most_bound = gpu.limits().max_storage_buffer_binding_size & !3;
         let entries: Vec<wgpu::BindGroupEntry<'_>> = buffers
             .iter()
@@ -144,7 +137,7 @@ impl Kernel {
 
 impl Bound {
     /// Adds a dispatch of `workgroups` or a few more, which the kernel ignores.
-    pub(crate) fn dispatch(&self, pass: &mut wgpu::ComputePass<'_>, workgroups: u32) {
+    pub fn dispatch(&self, pass: &mut wgpu::ComputePass<'_>, workgroups: u32) {
         let wide = workgroups.min(self.most);
         if wide > 0 {
             #[cfg(test)]

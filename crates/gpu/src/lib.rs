@@ -69,16 +69,18 @@ mod storage;
 mod transfer;
 mod tree;
 
-pub use sapwise::error::{GpuError, GpuErrorKind};
-pub use sapwise::internals::{GpuIdentity, GpuKind};
-pub use adapters::{Gpus, identity};
 #[cfg(test)]
 pub(crate) use adapters::first_for_tests;
+pub use adapters::{Gpus, identity};
 pub use device::Gpu;
 pub use methods::algorithms;
 pub use on_gpus::broad_phase;
-pub use source::add_to;
 pub use resident::{Resident, ResidentPairs, SubmittedCounts, SubmittedPairs};
+pub use sapwise::error::{GpuError, GpuErrorKind};
+pub use sapwise::internals::{GpuIdentity, GpuKind};
+#[doc(hidden)]
+pub use scope::Recording;
+pub use source::add_to;
 /// The version of wgpu whose buffers and devices this library takes. Its number is part of the name because another
 /// version has other types. A release that takes a newer wgpu exports it under a new name, and is a breaking one.
 pub use wgpu as wgpu30;

@@ -5,10 +5,10 @@ use super::failure::{Failure, unavailable};
 use super::look::Look;
 use super::share::{Share, sizes, worst};
 use super::slabs::Slabs;
-use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Pairs};
 use sapwise::algorithm::{Backend, FramePlan};
 use sapwise::error::{GpuError, ParseIdError};
 use sapwise::internals::{SceneStats, Threads, Workers, check_count};
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Pairs};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 

@@ -5,9 +5,9 @@ use super::engine::Engine;
 use super::failure::{Failure, unavailable};
 use super::look::Look;
 use super::params::Params;
-use sapwise::{Aabb, AlgorithmId, Error};
 use sapwise::algorithm::Backend;
 use sapwise::error::{BoxDefect, ParseIdError};
+use sapwise::{Aabb, AlgorithmId, Error};
 
 /// Finds the pairs of boxes in the memory of a GPU and leaves them there, for engines whose data never leave it.
 ///

@@ -38,7 +38,7 @@ impl Drop for Scope {
 }
 
 /// Commands that are being recorded. One scope covers them until they are submitted.
-pub(crate) struct Recording {
+pub struct Recording {
     encoder: wgpu::CommandEncoder,
     scope: Scope,
 }

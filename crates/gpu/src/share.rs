@@ -5,10 +5,10 @@ use super::engine::Engine;
 use super::failure::Failure;
 use super::look::Look;
 use super::slabs::{Members, Slabs};
-use sapwise::{Aabb, Pairs};
 use sapwise::algorithm::FramePlan;
 use sapwise::error::GpuError;
 use sapwise::internals::SampledBoxes;
+use sapwise::{Aabb, Pairs};
 use std::time::Instant;
 
 /// Weight of the last frame in the measured speed of a GPU.

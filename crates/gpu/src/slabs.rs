@@ -1,7 +1,7 @@
 //! The paper's spatial subdivision: slabs along one axis, each with a halo, each pair owned by one slab.
 
-use sapwise::{Aabb, Error};
 use sapwise::internals::SceneStats;
+use sapwise::{Aabb, Error};
 
 /// Most boxes whose lower bounds place the cuts. With 4096, the size of a slab is nearly always within 2 % of all
 /// boxes.

@@ -4,9 +4,9 @@ use super::adapters::Gpus;
 use super::failure::unavailable;
 use super::methods::{algorithms, has_method};
 use super::on_gpus::OnGpus;
-use sapwise::{AlgorithmId, BroadPhase, Error, Registry};
 use sapwise::algorithm::{AlgorithmSource, Backend, Entry};
 use sapwise::error::GpuError;
+use sapwise::{AlgorithmId, BroadPhase, Error, Registry};
 
 impl AlgorithmSource for Gpus {
     fn entries(&self) -> Vec<Entry> {

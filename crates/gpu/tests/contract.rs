@@ -6,8 +6,8 @@
 mod common;
 
 use common::{Random, WORLDS, denormals, gpus, large_boxes, lattice, naive, naive_filtered};
-use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Filter, Membership, PairOrder, Pairs, Registry};
 use sapwise::error::BoxDefect;
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Filter, Membership, PairOrder, Pairs, Registry};
 use sapwise_gpu::{Gpus, broad_phase};
 use sapwise_scenes::Scenario;
 

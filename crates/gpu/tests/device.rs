@@ -6,8 +6,8 @@ mod common;
 
 use common::gpu::upload;
 use common::{Random, gpus, naive};
-use sapwise::{Aabb, BroadPhase, Error, PairOrder, Pairs, Registry};
 use sapwise::error::{GpuErrorKind, Unavailable};
+use sapwise::{Aabb, BroadPhase, Error, PairOrder, Pairs, Registry};
 use sapwise_gpu::{Gpu, GpuIdentity, Gpus, Resident, broad_phase, wgpu30 as wgpu};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};

@@ -3,9 +3,9 @@
 mod common;
 
 use common::{Random, gpus, naive};
-use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, PairOrder, Pairs, Reason, Registry, Tuning};
 use sapwise::algorithm::{Entry, Load};
 use sapwise::tuning::{AlgorithmCost, CostCurve, CostTerm, Source, Term};
+use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, PairOrder, Pairs, Reason, Registry, Tuning};
 use sapwise_gpu::{Gpu, GpuIdentity, GpuKind, Gpus, broad_phase, wgpu30 as wgpu};
 use sapwise_scenes::Scenario;
 

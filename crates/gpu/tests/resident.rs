@@ -4,9 +4,9 @@ mod common;
 
 use common::gpu::{upload, words};
 use common::{Random, gpus, naive};
-use sapwise::{Aabb, Error};
 use sapwise::error::BoxDefect;
 use sapwise::internals::Pair;
+use sapwise::{Aabb, Error};
 use sapwise_gpu::{Gpu, Resident, wgpu30 as wgpu};
 
 const METHODS: [&str; 4] = ["brute", "sap", "grid-sap", "bvh"];

@@ -6,10 +6,10 @@ use crate::report::{Label, Point, Provenance, Report, Timed, Timing};
 use sapwise::AlgorithmId;
 use sapwise::algorithm::{BackendClass, Entry, Load};
 use sapwise::tuning::{AlgorithmCost, Term};
-use sapwise_tune::{GpuIdentity, GpuKind, Hardware, Model, Parameter};
+use sapwise_scenes::Random;
 use sapwise_tune::hardware::{GpuGroup, GpuHardware, GpuParameterId, ParameterId};
 use sapwise_tune::model::{FallbackModel, HelpersModel, MethodModel, ModelTerm, Scale};
-use sapwise_scenes::Random;
+use sapwise_tune::{GpuIdentity, GpuKind, Hardware, Model, Parameter};
 
 /// A machine of the made-up family.
 #[derive(Debug, Clone)]

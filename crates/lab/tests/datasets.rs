@@ -2,12 +2,12 @@
 
 use sapwise::Registry;
 use sapwise::algorithm::{BackendClass, Entry};
-use sapwise_tune::{Hardware, Model};
-use sapwise_tune::hardware::{GpuParameterId, ParameterId};
 use sapwise_lab::data::{host, read_reports};
 use sapwise_lab::progress::Silent;
 use sapwise_lab::report::{self, Label, Report};
 use sapwise_lab::{Training, read_model};
+use sapwise_tune::hardware::{GpuParameterId, ParameterId};
+use sapwise_tune::{Hardware, Model};
 use std::path::{Path, PathBuf};
 
 fn repository(path: &str) -> PathBuf {

@@ -1,7 +1,7 @@
 //! The paper's three cards in `datasets/published/` hold what its Figure 9 prints.
 
-use sapwise_tune::hardware::{GpuParameterId, How, ParameterId};
 use sapwise_lab::report::{self, Label, Report};
+use sapwise_tune::hardware::{GpuParameterId, How, ParameterId};
 use std::path::Path;
 
 /// A column of Figure 9 and the machine of section 5 that the card stands in, in the paper's units.

@@ -11,8 +11,8 @@ use crate::record::{self, RankRecord};
 use crate::sample::Sample;
 use crate::search::{BOX_WORDS, LocalSearch, words};
 use crate::share::{FACTORS, costs, pair_cost, shares};
-use sapwise::{Aabb, Adaptive, Registry, Tuning};
 use sapwise::algorithm::Load;
+use sapwise::{Aabb, Adaptive, Registry, Tuning};
 use std::time::Instant;
 
 /// Words of a pair: the id of the owner's box, then the other.

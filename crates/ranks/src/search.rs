@@ -4,8 +4,8 @@ use crate::balance::Times;
 use crate::cuts::{Region, centre};
 use crate::sample::Sample;
 use crate::share::predicted_ns;
-use sapwise::{Aabb, Adaptive, BroadPhase, Error, Pairs};
 use sapwise::algorithm::Load;
+use sapwise::{Aabb, Adaptive, BroadPhase, Error, Pairs};
 use std::time::Instant;
 
 /// Words of a box: six floats and its id.

@@ -3,8 +3,8 @@
 mod harness;
 
 use harness::{Owners, distributed, edge_cases, play};
-use sapwise::{Aabb, AlgorithmId, Registry, Tuning};
 use sapwise::tuning::{AlgorithmCost, CostCurve, CostTerm, Source, Term};
+use sapwise::{Aabb, AlgorithmId, Registry, Tuning};
 use sapwise_ranks::{Distributed, Error, Exchange, Failure, RankPairs, Threads};
 use sapwise_scenes::Scenario;
 
@@ -102,7 +102,8 @@ fn a_rank_without_an_algorithm_is_an_error_on_all() {
     let errors = Threads::run(3, |threads| {
         let registry = Registry::with_cores(1);
         let unknown =
-            Tuning::from_steps(vec![sapwise::tuning::Step::new(0, "bvh@cpu64".parse::<AlgorithmId>().unwrap())]).unwrap();
+            Tuning::from_steps(vec![sapwise::tuning::Step::new(0, "bvh@cpu64".parse::<AlgorithmId>().unwrap())])
+                .unwrap();
         let tuning = if threads.rank() == 2 { unknown } else { Tuning::usual(&registry) };
         Distributed::<Threads>::new(threads, &registry, tuning).map(|_| ()).unwrap_err()
     });

@@ -6,14 +6,14 @@ mod slice;
 
 pub use options::StartOptions;
 
-use sapwise::{Adaptive, Error};
-use sapwise::algorithm::Entry;
-use sapwise::internals::{Arrival, Background, Instances, Origin, Setup, Start};
 use crate::hardware::{GpuHardware, Hardware, Parameter, ParameterId};
 use crate::measure;
 use crate::model::Model;
-use sapwise::{Registry, Tuning};
 use cache::CacheFile;
+use sapwise::algorithm::Entry;
+use sapwise::internals::{Arrival, Background, Instances, Origin, Setup, Start};
+use sapwise::{Adaptive, Error};
+use sapwise::{Registry, Tuning};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
@@ -66,7 +66,9 @@ fn in_background(options: &StartOptions, began: Instant) -> Result<Adaptive, Err
         Err(e) => (Origin::Usual, vec![format!("no background thread can be started ({e}): the usual tuning stays")]),
     };
     let background = thread.ok().map(|thread| Background { thread: Some(thread), stop });
-    adaptive.set_start(Start { setup: Setup { origin, remarks, ..Setup::default() }, save: None, background });
+    let mut setup = Setup::default();
+    (setup.origin, setup.remarks) = (origin, remarks);
+    adaptive.set_start(Start { setup, save: None, background });
     Ok(adaptive)
 }
 
@@ -75,13 +77,17 @@ fn usual_registry() -> Registry {
     #[cfg_attr(not(feature = "gpu"), expect(unused_mut, reason = "there is nothing to add"))]
     let mut registry = Registry::new();
     #[cfg(feature = "gpu")]
-    sapwise_gpu::add_to(&mut registry, &sapwise_gpu::Gpus::find().choose(|gpu| gpu.kind != sapwise_gpu::GpuKind::Software));
+    sapwise_gpu::add_to(
+        &mut registry,
+        &sapwise_gpu::Gpus::find().choose(|gpu| gpu.kind != sapwise_gpu::GpuKind::Software),
+    );
     registry
 }
 
 /// Finds the tuning of this machine and makes its algorithms.
 fn arrive(options: &StartOptions, registry: &Registry, began: Instant, stop: Arc<AtomicBool>) -> Arrival {
-    let setup = Setup { origin: Origin::Usual, ..Setup::default() };
+    let mut setup = Setup::default();
+    setup.origin = Origin::Usual;
     let mut arrival = Arrival { setup, save: None, tuning: None };
     if let Some(found) = find(options, registry, &stop, &mut arrival.setup.remarks) {
         let mut made = Instances::of(&found.tuning, registry);
@@ -184,8 +190,10 @@ fn hardware(
     }
     hardware.machine.simd = simd.to_string();
     #[cfg(feature = "gpu")]
+    let gpus = registry.source::<sapwise_gpu::Gpus>().cloned().unwrap_or_default();
+    #[cfg(feature = "gpu")]
     for index in gpus.identities().map(|g| g.index).take_while(|_| !plan.is_stopped()) {
-        match measure::gpu(gpus, index, &plan) {
+        match measure::gpu(&gpus, index, &plan) {
             Ok(gpu) => hardware.gpus.push(gpu),
             Err(why) => remarks.push(format!("gpu{index} can't be measured: {why}")),
         }

@@ -11,14 +11,13 @@ mod unit;
 pub use error::HardwareError;
 pub use figure::{How, Parameter};
 pub use gpu::{GpuGroup, GpuHardware};
-pub use sapwise::internals::{GpuIdentity, GpuKind};
 pub use parameter::{Bounds, GpuParameterId, ParameterId, Quantity};
+pub use sapwise::internals::{GpuIdentity, GpuKind};
 pub use statistic::Statistic;
 pub use unit::with_unit;
 
 /// What is known about a machine: its identity and a list of parameters, each with its origin.
-#[derive(Debug, Clone, PartialEq)]
-#[derive(serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct Hardware {
@@ -35,8 +34,7 @@ pub struct Hardware {
 }
 
 /// The identity of a machine. Names no host, no user and no single piece of hardware.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-#[derive(serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct Machine {

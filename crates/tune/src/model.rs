@@ -8,10 +8,10 @@ mod needed;
 mod predict;
 mod scale;
 
-use sapwise::internals::Places;
 use crate::hardware::ParameterId;
 use sapwise::algorithm::BackendClass;
 use sapwise::internals::GpuKind;
+use sapwise::internals::Places;
 use sapwise::tuning::Term;
 use std::sync::Arc;
 
@@ -27,8 +27,7 @@ pub const GPU_PREFIX: &str = "gpu/";
 ///
 /// The time of a frame on one thread, or on GPUs, is `sum of unit * scale(hardware, backend) * term(load)`, times `exp` of a
 /// [residual](sapwise::internals::Residual) over the load. [Helpers](HelpersModel) turn it into the time on several threads.
-#[derive(Debug, Clone, PartialEq)]
-#[derive(serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct Model {
@@ -49,8 +48,7 @@ pub struct Model {
 }
 
 /// Range of a hardware parameter in training.
-#[derive(Debug, Clone, PartialEq)]
-#[derive(serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub struct Range {
     /// Name of the parameter; that of a GPU after [`GPU_PREFIX`].
@@ -62,8 +60,7 @@ pub struct Range {
 }
 
 /// The cost model of one method on one class of processor, for any number of threads or GPUs.
-#[derive(Debug, Clone, PartialEq)]
-#[derive(serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct MethodModel {
@@ -98,8 +95,7 @@ pub struct MethodModel {
 }
 
 /// A method that another one falls back to.
-#[derive(Debug, Clone, PartialEq)]
-#[derive(serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub struct FallbackModel {
     /// Its name. It has no fallback itself.
@@ -109,8 +105,7 @@ pub struct FallbackModel {
 }
 
 /// One physical term.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[derive(serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub struct ModelTerm {
     /// What is counted.

@@ -2,9 +2,9 @@
 
 use std::collections::HashSet;
 
-use sapwise_tune::{How, Parameter};
 use sapwise_tune::hardware::ParameterId;
 use sapwise_tune::measure::{self, Family, Options};
+use sapwise_tune::{How, Parameter};
 
 fn brief(threads: Option<u32>) -> Options {
     Options::default().with_threads(threads).brief(true)

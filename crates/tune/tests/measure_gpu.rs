@@ -7,9 +7,9 @@ mod common;
 
 use common::gpus;
 use sapwise_gpu::Gpus;
-use sapwise_tune::{GpuKind, How, Parameter};
 use sapwise_tune::hardware::GpuParameterId;
 use sapwise_tune::measure::{self, Options};
+use sapwise_tune::{GpuKind, How, Parameter};
 
 fn options(brief: bool) -> Options {
     Options::default().brief(brief)

@@ -17,9 +17,9 @@ mod common;
 mod kept;
 
 use common::{Random, naive};
-use sapwise::{Adaptive, BroadPhase, Error, PairOrder, Pairs, Reason, Registry, Tuning};
 use sapwise::algorithm::Load;
 use sapwise::tuning::{AlgorithmCost, CostCurve, CostTerm, Source, Term};
+use sapwise::{Adaptive, BroadPhase, Error, PairOrder, Pairs, Reason, Registry, Tuning};
 use sapwise_scenes::Scenario;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::collections::BTreeMap;
@@ -284,7 +284,7 @@ fn failures_lose_no_pair_and_leak_no_memory() {
     while tally.frames < frames {
         let length = (LIFE / 2 + below(&mut random, LIFE)).min(frames - tally.frames);
         if cfg!(feature = "this-machine") && below(&mut random, 4) == 0 {
-                    kept.program(length, &mut random, &mut tally);
+            kept.program(length, &mut random, &mut tally);
         } else {
             let learned = program(known, length, &mut random, &mut tally);
             // A program uses what the previous one has learned, unless it was deleted.

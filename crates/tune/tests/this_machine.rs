@@ -5,8 +5,8 @@
 mod common;
 
 use common::{Random, naive};
-use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, PairOrder, Pairs, Registry, Tuning};
 use sapwise::tuning::Source;
+use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, PairOrder, Pairs, Registry, Tuning};
 use sapwise_tune::{Origin, Setup, StartOptions};
 use std::fs;
 use std::path::Path;

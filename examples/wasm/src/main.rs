@@ -4,9 +4,9 @@
 //! `tools/wasm.sh` builds it for wasm32-unknown-unknown and runs it in Node.js; `cargo run -p sapwise-example-wasm`
 //! runs it here.
 
-use sapwise::{Aabb, Adaptive, BroadPhase, PairOrder, Pairs, Registry, Tuning};
 use sapwise::algorithm::Load;
 use sapwise::tuning::{AlgorithmCost, CostCurve, CostTerm, Source, Term};
+use sapwise::{Aabb, Adaptive, BroadPhase, PairOrder, Pairs, Registry, Tuning};
 
 /// The last frame has 1500 boxes.
 const FRAMES: usize = 60;

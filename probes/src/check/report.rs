@@ -5,10 +5,10 @@ use crate::gpus::{difference, uses};
 use crate::{date, revisions};
 use sapwise::algorithm::SimdLevel;
 use sapwise::internals::stats::median;
-use sapwise_tune::{GpuHardware, Hardware};
+use sapwise_lab::report::{Label, Point, Report};
 use sapwise_tune::hardware::ParameterId;
 use sapwise_tune::measure::Watch;
-use sapwise_lab::report::{Label, Point, Report};
+use sapwise_tune::{GpuHardware, Hardware};
 
 /// Several threads may be up to this factor faster than their number, by a clock that rises between two measurements.
 /// Above it, other programs disturbed the measurement of one thread.

@@ -2,8 +2,8 @@
 
 use super::{Finding, Here};
 use crate::revisions;
-use sapwise::{AlgorithmId, Tuning};
 use sapwise::algorithm::{Backend, usable_cores};
+use sapwise::{AlgorithmId, Tuning};
 
 impl Here {
     pub(super) fn tuning(&self, tuning: &Tuning, finding: &mut Finding) {

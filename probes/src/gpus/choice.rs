@@ -4,8 +4,8 @@ use super::look::Seen;
 use crate::exit::WrongUsage;
 use sapwise::AlgorithmId;
 use sapwise::algorithm::Backend;
-use sapwise_tune::{GpuIdentity, GpuKind};
 use sapwise_lab::report::Report;
+use sapwise_tune::{GpuIdentity, GpuKind};
 
 /// The options of verbs that take GPUs.
 #[derive(Debug, Clone, Default, PartialEq, Eq, clap::Args)]

@@ -3,8 +3,8 @@
 use super::choice::uses;
 use super::parameters::inert;
 use crate::child::{Ended, run_part};
-use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Pairs, Registry};
 use sapwise::error::{GpuErrorKind, Unavailable};
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Pairs, Registry};
 use sapwise_gpu::Gpus;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;

@@ -2,8 +2,8 @@
 
 use anyhow::anyhow;
 use sapwise_gpu::Gpus;
-use sapwise_tune::{GpuGroup, GpuHardware, GpuIdentity, GpuParameterId, Parameter};
 use sapwise_tune::measure::Options;
+use sapwise_tune::{GpuGroup, GpuHardware, GpuIdentity, GpuParameterId, Parameter};
 
 /// Prints each GPU in a line.
 ///

@@ -5,8 +5,8 @@ use crate::args::Probe;
 use crate::gpus::GpuChoice;
 use crate::provenance;
 use sapwise::algorithm::SimdLevel;
-use sapwise_tune::{GpuIdentity, GpuKind};
 use sapwise_lab::sweep::Plan;
+use sapwise_tune::{GpuIdentity, GpuKind};
 use std::time::Duration;
 
 /// Time for the hardware parameters of the CPU and for starting processes.

@@ -1,9 +1,9 @@
 //! The outcome of a replay and the numbers that follow from it.
 
 use super::samples::{Samples, windows};
-use sapwise::{AlgorithmId, Reason};
 use sapwise::algorithm::Load;
 use sapwise::internals::stats::{median, quantile};
+use sapwise::{AlgorithmId, Reason};
 use sapwise_lab::figures::Replay;
 use serde::Serialize;
 use std::ops::Range;

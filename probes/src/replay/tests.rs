@@ -1,8 +1,8 @@
 //! Tests of whole replays.
 
 use super::*;
-use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Pairs, Reason, Registry, Tuning};
 use sapwise::tuning::Step;
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Pairs, Reason, Registry, Tuning};
 use sapwise_scenes::Scenario;
 
 fn steps(list: &[(u32, &str)]) -> Tuning {

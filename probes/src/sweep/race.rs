@@ -5,12 +5,12 @@
 
 use super::contest::{Contest, FEW_FRAMES};
 use super::verify::Answer;
-use sapwise::{Aabb, AlgorithmId, BroadPhase, Pairs};
 use sapwise::algorithm::{Displacement, Load};
-use sapwise_tune::measure::{Options, Watch, core_to_core_ns};
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Pairs};
 use sapwise_lab::report::{Point, Timing};
 use sapwise_lab::sweep::{WARM_UP, next_frame};
 use sapwise_scenes::{Random, Scene};
+use sapwise_tune::measure::{Options, Watch, core_to_core_ns};
 use std::time::{Duration, Instant};
 
 /// Most frames: beyond this the error of a median falls too slowly to be worth the time.

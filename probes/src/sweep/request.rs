@@ -1,8 +1,8 @@
 //! The request to a sweeping process and its events.
 
 use sapwise::AlgorithmId;
-use sapwise_tune::GpuIdentity;
 use sapwise_lab::report::Point;
+use sapwise_tune::GpuIdentity;
 use serde::{Deserialize, Serialize};
 
 /// The sweep of one scenario by a process of its own.

@@ -6,10 +6,10 @@ use crate::child::{Ended, run_part};
 use crate::interrupt;
 use crate::progress::Progress;
 use anyhow::Context;
-use sapwise_tune::GpuIdentity;
 use sapwise_lab::report::Point;
 use sapwise_lab::sweep::Plan;
 use sapwise_scenes::Random;
+use sapwise_tune::GpuIdentity;
 use std::time::{Duration, Instant};
 
 /// Time of a scenario beyond its own: start-up, the first scene, and a last frame that was forecast too short.

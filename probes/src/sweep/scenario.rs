@@ -5,10 +5,10 @@ use super::request::{Event, Schedule, SweepRequest, Visit};
 use crate::algorithms::Algorithms;
 use sapwise::{AlgorithmId, Registry};
 use sapwise_gpu::Gpus;
-use sapwise_tune::GpuIdentity;
 use sapwise_lab::report::Point;
 use sapwise_lab::sweep::{Standing, median, share};
 use sapwise_scenes::Scenario;
+use sapwise_tune::GpuIdentity;
 use std::time::{Duration, Instant};
 
 /// Most pairs in a frame, 8 bytes each: 256 MB, and as much again in the threads of an algorithm.

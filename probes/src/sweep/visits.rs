@@ -2,9 +2,9 @@
 
 use super::request::Visit;
 use sapwise::AlgorithmId;
-use sapwise_tune::measure::Watch;
 use sapwise_lab::report::Point;
 use sapwise_lab::sweep::{WARM_UP, median};
+use sapwise_tune::measure::Watch;
 use std::collections::BTreeMap;
 use std::time::Duration;
 

@@ -9,8 +9,8 @@ use crate::progress::Progress;
 use crate::terminal::Terminal;
 use sapwise::AlgorithmId;
 use sapwise::algorithm::{SimdLevel, usable_cores};
-use sapwise_tune::GpuIdentity;
 use sapwise_lab::text::count;
+use sapwise_tune::GpuIdentity;
 use serde::Serialize;
 
 /// The answer for machines.

@@ -10,11 +10,11 @@ use crate::prediction::{self, Slice};
 use crate::terminal::Terminal;
 use crate::{interrupt, output, outputs, shell, summary};
 use anyhow::{Context, bail};
-use sapwise_tune::json;
 use sapwise_lab::data::{Document, read_document};
 use sapwise_lab::report::Report;
 use sapwise_lab::write::write_text;
 use sapwise_scenes::Scenario;
+use sapwise_tune::json;
 use std::path::{Path, PathBuf};
 
 pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Result<Outcome> {

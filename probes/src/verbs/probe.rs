@@ -11,10 +11,10 @@ use crate::terminal::Terminal;
 use crate::{child, interrupt, node, output, profiles, provenance, summary};
 use anyhow::Context;
 use sapwise::algorithm::usable_cores;
-use sapwise_tune::{Hardware, measure};
 use sapwise_lab::data::read_report;
 use sapwise_lab::report::{self, Report};
 use sapwise_lab::sweep::Plan;
+use sapwise_tune::{Hardware, measure};
 use std::path::Path;
 use std::time::Instant;
 

@@ -7,10 +7,10 @@ use crate::progress::Progress;
 use crate::terminal::Terminal;
 use crate::{interrupt, output, outputs, shell};
 use rayon::prelude::*;
-use sapwise_tune::Model;
 use sapwise_lab::data::{Selection, read_report, report_files};
 use sapwise_lab::write::write_text;
 use sapwise_lab::{Trained, Training, Validation, model_card, train, write_model};
+use sapwise_tune::Model;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 

@@ -4,8 +4,8 @@
 use super::super::decision::Reason;
 use super::super::policy::Policy;
 use super::tuning;
-use crate::{AlgorithmId, Tuning};
 use crate::algorithm::{FrameKind, FrameWork, Load};
+use crate::{AlgorithmId, Tuning};
 use std::sync::Arc;
 
 /// What a frame of an algorithm really takes: by its position, the number of objects and the frame.

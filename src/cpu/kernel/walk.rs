@@ -4,7 +4,7 @@ use super::node::{Group, LANES, Node};
 use super::prefetch;
 use crate::aabb::Aabb;
 use crate::cpu::level::Simd;
-use crate::pairs::{each_bit, Pairs};
+use crate::pairs::{Pairs, each_bit};
 use std::ops::Range;
 
 /// The nodes of a tree, and the box in each lane of its leaves.

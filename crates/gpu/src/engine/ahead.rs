@@ -2,14 +2,14 @@
 //! frame.
 
 use super::{Engine, Pending, Step};
-use sapwise::error::{GpuError, GpuErrorKind};
 use crate::look::Look;
 use crate::params::{Header, Params};
 use bytemuck::bytes_of;
+use sapwise::error::{GpuError, GpuErrorKind};
 
 impl Engine {
     /// Submits a frame of boxes that are on the GPU.
-    pub(in crate) fn submit_ahead(&mut self, boxes: &wgpu::Buffer, mut params: Params) -> Result<(), GpuError> {
+    pub(crate) fn submit_ahead(&mut self, boxes: &wgpu::Buffer, mut params: Params) -> Result<(), GpuError> {
         if self.search.blocks(params.objects) > u64::from(self.search.most_blocks()) {
             let text = format!(
                 "brute takes several submissions for {} boxes, and waits between them: use bvh",
@@ -34,7 +34,7 @@ impl Engine {
     }
 
     /// Returns the header and the sample of a frame that was submitted ahead, if they have arrived.
-    pub(in crate) fn arrived(&mut self) -> Result<Option<(Header, Look)>, GpuError> {
+    pub(crate) fn arrived(&mut self) -> Result<Option<(Header, Look)>, GpuError> {
         let Pending::Ahead(submission) = self.pending else { return Ok(None) };
         if !self.download.arrived(&self.gpu)? {
             if !self.download.is_on_its_way() {
@@ -50,12 +50,12 @@ impl Engine {
     }
 
     /// Returns the buffer of the [`Header`], which the program's kernels may read.
-    pub(in crate) fn header_buffer(&self) -> &wgpu::Buffer {
+    pub(crate) fn header_buffer(&self) -> &wgpu::Buffer {
         self.header.buffer()
     }
 
     /// Submits a frame without boxes.
-    pub(in crate) fn submit_nothing(&self) -> Result<(), GpuError> {
+    pub(crate) fn submit_nothing(&self) -> Result<(), GpuError> {
         let encoder = self.gpu.record();
         self.gpu.queue().write_buffer(self.header.buffer(), 0, bytes_of(&Header::START));
         self.gpu.submit(encoder).map(drop)

@@ -1,18 +1,18 @@
 //! Waiting for a frame, downloading its pairs, and going on if one submission was not enough.
 
 use super::{Engine, Frame, PAIRS_AT, Pending, Step};
-use sapwise::Error;
-use sapwise::error::GpuError;
 use crate::failure::Failure;
 use crate::look::Look;
 use crate::output::PAIR;
 use crate::params::{Header, Params};
+use sapwise::Error;
 use sapwise::Pairs;
+use sapwise::error::GpuError;
 use std::mem::{offset_of, take};
 
 impl Engine {
     /// Waits for the frame, and adds its pairs to the list.
-    pub(in crate) fn finish(&mut self, pairs: &mut Pairs) -> Result<(), Failure> {
+    pub(crate) fn finish(&mut self, pairs: &mut Pairs) -> Result<(), Failure> {
         let mut all = 0;
         while let Pending::Frame(mut frame) = take(&mut self.pending) {
             let header = self.header_of(&frame)?;
@@ -35,7 +35,7 @@ impl Engine {
 
     /// Waits for the frame. Returns the number of pairs, all of which are in [`pairs_buffer`](Self::pairs_buffer),
     /// and what the boxes look like.
-    pub(in crate) fn finish_resident(&mut self) -> Result<(u32, Look), Failure> {
+    pub(crate) fn finish_resident(&mut self) -> Result<(u32, Look), Failure> {
         let mut all = 0_u64;
         let mut look = None;
         while let Pending::Frame(mut frame) = take(&mut self.pending) {
@@ -78,7 +78,7 @@ impl Engine {
     }
 
     /// Returns the list of pairs of the previous frame.
-    pub(in crate) fn pairs_buffer(&self) -> &wgpu::Buffer {
+    pub(crate) fn pairs_buffer(&self) -> &wgpu::Buffer {
         self.output.pairs()
     }
 

@@ -1,14 +1,14 @@
 use super::{Engine, Pending};
-use sapwise::Aabb;
-use sapwise::error::GpuErrorKind;
 use crate::failure::Failure;
 use crate::kernel::dispatched;
 use crate::look::Look;
 use crate::output::Output;
 use crate::params::{Header, Params};
-use crate::{first_for_tests, Gpus};
-use sapwise::{PairOrder, Pairs};
+use crate::{Gpus, first_for_tests};
+use sapwise::Aabb;
+use sapwise::error::GpuErrorKind;
 use sapwise::internals::{SampledBoxes, Scenario, Scene};
+use sapwise::{PairOrder, Pairs};
 use wgpu::util::DeviceExt;
 
 const METHODS: [&str; 4] = ["brute", "sap", "grid-sap", "bvh"];

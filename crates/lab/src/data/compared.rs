@@ -1,8 +1,8 @@
 //! The parameters by which machines are compared with each other and with those of a training.
 
-use sapwise_tune::{GpuHardware, GpuKind, Hardware};
 use sapwise_tune::hardware::{GpuParameterId, ParameterId};
 use sapwise_tune::model::GPU_PREFIX;
+use sapwise_tune::{GpuHardware, GpuKind, Hardware};
 
 /// Parameters of a machine without its GPUs.
 pub const COMPARED: [ParameterId; 8] = [

@@ -2,10 +2,10 @@
 
 use super::regret_table::{NOT_TIMED, Strategy};
 use crate::data::{COMPARED, COMPARED_OF_GPUS, Profile, figure};
-use sapwise::{AlgorithmId, Tuning};
 use sapwise::algorithm::BackendClass;
 use sapwise::internals::stats;
 use sapwise::tuning::AlgorithmCost;
+use sapwise::{AlgorithmId, Tuning};
 use sapwise_tune::Hardware;
 use sapwise_tune::model::GPU_PREFIX;
 

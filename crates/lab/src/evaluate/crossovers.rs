@@ -3,9 +3,9 @@
 use super::baselines::closest;
 use crate::data::Profile;
 use crate::fit::{measured_slice, slice_tuning};
-use sapwise::{AlgorithmId, Tuning};
 use sapwise::algorithm::Load;
 use sapwise::tuning::{AlgorithmCost, Crossover, Source};
+use sapwise::{AlgorithmId, Tuning};
 
 /// The crossovers of the measured tuning of one profile, in its usual scenario.
 #[derive(Debug, Clone, Default)]

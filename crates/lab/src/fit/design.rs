@@ -14,11 +14,11 @@ use anyhow::Result;
 use ndarray::{Array1, Array2, Axis};
 use sapwise::AlgorithmId;
 use sapwise::algorithm::{Backend, BackendClass};
-use sapwise::internals::{Fallback, Places, Work};
 use sapwise::internals::stats::robust_deviation;
-use sapwise_tune::{GpuKind, Hardware};
+use sapwise::internals::{Fallback, Places, Work};
 use sapwise_tune::hardware::ParameterId;
 use sapwise_tune::model::{FallbackModel, HelpersModel, MethodModel, ModelTerm, PredictError, ThreadFigures};
+use sapwise_tune::{GpuKind, Hardware};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

@@ -83,7 +83,8 @@ pub(crate) fn places<'a>(profiles: impl Iterator<Item = &'a Profile>, without: O
 pub(crate) fn weights(places: &Places, remainders: &[Remainder], by_motion: bool) -> Result<Vec<f64>> {
     let some = Random::named(1, &["rows"]).shuffled(remainders.len());
     let rows: Vec<&Remainder> = some.into_iter().take(MOST_ROWS).map(|k| &remainders[k]).collect();
-    let spread = sapwise::internals::stats::robust_deviation(&rows.iter().map(|r| r.ln).collect::<Vec<f64>>()).unwrap_or(0.0);
+    let spread =
+        sapwise::internals::stats::robust_deviation(&rows.iter().map(|r| r.ln).collect::<Vec<f64>>()).unwrap_or(0.0);
     let reach = (REACH * spread).max(LEAST_REACH_LN);
     let count = places.loads().len();
     let mut likeness = Array2::zeros((rows.len(), count));

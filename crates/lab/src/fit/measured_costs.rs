@@ -7,12 +7,12 @@ use crate::fit::model::model;
 use crate::fit::rows::{Row, rows};
 use crate::report::Timed;
 use crate::text::count;
-use sapwise::tuning;
 use sapwise::algorithm::Entry;
+use sapwise::tuning;
 use sapwise::tuning::AlgorithmCost;
-use sapwise_tune::{Hardware, Model, Parameter};
-use sapwise_tune::hardware::{GpuParameterId, ParameterId, Quantity};
 use sapwise_scenes::Random;
+use sapwise_tune::hardware::{GpuParameterId, ParameterId, Quantity};
+use sapwise_tune::{Hardware, Model, Parameter};
 
 /// Points that a cost needs.
 pub(super) const FEWEST_POINTS: usize = 3;
@@ -94,8 +94,8 @@ fn corrected(costs: &[AlgorithmCost], profile: &Profile, all: &[Row]) -> Vec<Alg
 mod tests {
     use super::*;
     use crate::synthetic::{Machine, load};
-    use sapwise::{AlgorithmId, Tuning};
     use sapwise::tuning::Source;
+    use sapwise::{AlgorithmId, Tuning};
 
     #[test]
     fn what_was_timed_in_small_scenes_only_is_not_cheap_in_large_ones() {

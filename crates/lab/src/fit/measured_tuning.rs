@@ -5,9 +5,9 @@ use crate::fit::measured_costs::{FEWEST_POINTS, measured_costs_over};
 use crate::paired::{PairedRatio, PairedSamples};
 use crate::report::Report;
 use anyhow::{Result, bail};
-use sapwise::{AlgorithmId, Tuning};
 use sapwise::algorithm::Load;
 use sapwise::tuning::{AlgorithmCost, Crossover, Source};
+use sapwise::{AlgorithmId, Tuning};
 use sapwise_tune::Model;
 
 /// Returns the tuning of the machine of a report, with steps and crossovers for `scenario`.

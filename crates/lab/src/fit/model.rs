@@ -4,8 +4,8 @@ use super::designs::{Designs, Fitted, TrainingSet};
 use crate::data::{COMPARED, COMPARED_OF_GPUS, Profile, is_real};
 use anyhow::{Result, bail};
 use sapwise::algorithm::Backend;
-use sapwise_tune::{GpuHardware, Model};
 use sapwise_tune::model::{GPU_PREFIX, Range};
+use sapwise_tune::{GpuHardware, Model};
 
 /// Fits a model to the chosen profiles. Returns it with sentences on what was left out and why.
 ///

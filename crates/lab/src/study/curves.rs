@@ -5,9 +5,9 @@ use crate::data::{Profile, is_real};
 use crate::figures::{Curve, CurvePanel, Curves, Field};
 use crate::fit::slice_tuning;
 use anyhow::Result;
-use sapwise::{AlgorithmId, Tuning};
 use sapwise::algorithm::{Backend, BackendClass};
 use sapwise::internals::stats::{mean, median};
+use sapwise::{AlgorithmId, Tuning};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Hosts in one figure at most.

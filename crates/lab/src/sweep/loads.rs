@@ -1,8 +1,8 @@
 //! The loads of a scenario over sizes, with the real number of pairs.
 
 use anyhow::Context;
-use sapwise::{Pairs, Registry};
 use sapwise::algorithm::{Displacement, Load};
+use sapwise::{Pairs, Registry};
 use sapwise_scenes::{Scenario, Scene};
 
 /// Advances to the next frame with all objects. Only `fragmentation` has others.

@@ -5,8 +5,8 @@
 
 #![allow(dead_code, reason = "each test uses some of it")]
 
-use sapwise::{Aabb, Adaptive, BroadPhase, PairOrder, Pairs, Registry, Tuning};
 use sapwise::error::BoxDefect;
+use sapwise::{Aabb, Adaptive, BroadPhase, PairOrder, Pairs, Registry, Tuning};
 use sapwise_ranks::{Distributed, Error, Exchange, RankPairs};
 use sapwise_scenes::{Random, Scenario};
 

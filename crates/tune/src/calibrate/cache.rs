@@ -3,11 +3,11 @@
 //! It is a `tuning/2` file. Its name is a hash of everything that the tuning depends on, and its modification time is
 //! the time of the measurement.
 
-use sapwise_tune::SaveError;
 use crate::json;
 use crate::measure::{fnv1a, machine};
-use sapwise::{Registry, Tuning};
 use sapwise::algorithm::usable_cores;
+use sapwise::internals::{GpuIdentity, SaveError};
+use sapwise::{Registry, Tuning};
 use std::fs;
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -73,7 +73,19 @@ fn key(registry: &Registry) -> String {
     let version = env!("CARGO_PKG_VERSION");
     let machine = (machine(), registry.simd(), usable_cores(), registry.helpers());
     let algorithms: Vec<_> = registry.available().into_iter().map(|e| (e.id, e.revision)).collect();
-    format!("{:?}", (version, machine, algorithms, registry.gpu_identities(), fnv1a(json::BUILT_IN)))
+    format!("{:?}", (version, machine, algorithms, gpus(registry), fnv1a(json::BUILT_IN)))
+}
+
+/// Returns the GPUs of a registry.
+#[cfg(feature = "gpu")]
+fn gpus(registry: &Registry) -> Vec<GpuIdentity> {
+    registry.source::<sapwise_gpu::Gpus>().map_or_else(Vec::new, |gpus| gpus.identities().cloned().collect())
+}
+
+/// Returns the GPUs of a registry: none in this build.
+#[cfg(not(feature = "gpu"))]
+fn gpus(_: &Registry) -> Vec<GpuIdentity> {
+    Vec::new()
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The options of a start on this machine.
 
-use sapwise::Registry;
 use etcetera::BaseStrategy;
+use sapwise::Registry;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;

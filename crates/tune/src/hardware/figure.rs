@@ -1,12 +1,11 @@
 //! One parameter of a machine: its value and origin.
 
 use super::{HardwareError, Statistic};
-use sapwise::named;
 use sapwise::internals::stats;
+use sapwise::named;
 
 /// One parameter of a machine: its value and origin.
-#[derive(Debug, Clone, PartialEq)]
-#[derive(serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct Parameter {

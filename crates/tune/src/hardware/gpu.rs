@@ -4,8 +4,7 @@ use super::{GpuParameterId, Parameter};
 use sapwise::internals::GpuIdentity;
 
 /// One GPU: its identity and parameters.
-#[derive(Debug, Clone, PartialEq)]
-#[derive(serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct GpuHardware {
@@ -16,8 +15,7 @@ pub struct GpuHardware {
 }
 
 /// Several GPUs that work at the same time.
-#[derive(Debug, Clone, PartialEq)]
-#[derive(serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct GpuGroup {

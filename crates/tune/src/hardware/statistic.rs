@@ -1,7 +1,7 @@
 //! How a value follows from its samples.
 
-use sapwise::named;
 use sapwise::internals::stats;
+use sapwise::named;
 
 named! {
     /// How a measured value follows from its samples.

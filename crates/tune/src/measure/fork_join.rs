@@ -6,9 +6,9 @@
 use std::time::{Duration, Instant};
 
 use super::Options;
-use sapwise::internals::{Threads, Workers};
 use crate::hardware::{Parameter, ParameterId};
 use sapwise::internals::stats::median;
+use sapwise::internals::{Threads, Workers};
 
 /// Body of a warm phase: many times the cost of a start.
 const SHORT: Duration = Duration::from_micros(20);

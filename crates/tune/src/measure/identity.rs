@@ -1,8 +1,8 @@
 //! The identity of the machine.
 
 use super::cache_sizes;
-use sapwise::algorithm::SimdLevel;
 use crate::hardware::Machine;
+use sapwise::algorithm::SimdLevel;
 
 /// Text that the CPU or the operating system reports; empty if it reports none.
 #[derive(Debug, Clone, Default)]

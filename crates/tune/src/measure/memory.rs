@@ -9,8 +9,8 @@ use sysinfo::{ProcessRefreshKind, ProcessesToUpdate, System};
 
 use super::samples::Plan;
 use super::{Options, cache_sizes, filled, missing, pool};
-use sapwise::algorithm::SimdLevel;
 use crate::hardware::{Parameter, ParameterId};
+use sapwise::algorithm::SimdLevel;
 
 /// Bytes that STREAM counts for one element of triad: two read, one written, without the line that is fetched before the write.
 const BYTES_PER_ELEMENT: u64 = 24;
@@ -164,7 +164,7 @@ fn pass(a: &mut [f64], b: &[f64], c: &[f64]) {
         SimdLevel::Avx512 => return unsafe { pass_avx512(a, b, c) },
         // SAFETY: the same.
         SimdLevel::Avx2 => return unsafe { pass_avx2(a, b, c) },
-        SimdLevel::Portable => {}
+        _ => {}
     }
     pass_portable(a, b, c);
 }

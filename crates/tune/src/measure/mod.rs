@@ -25,8 +25,8 @@ use std::time::{Duration, Instant};
 use rayon::ThreadPool;
 
 use crate::hardware::{Hardware, Parameter, ParameterId, Statistic};
-use sapwise::named;
 use samples::Plan;
+use sapwise::named;
 
 pub use core_to_core::core_to_core_ns;
 pub use foreign_load::Watch;

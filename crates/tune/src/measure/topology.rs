@@ -1,8 +1,8 @@
 //! Cores and SIMD lanes.
 
 use super::Options;
-use sapwise::algorithm::SimdLevel;
 use crate::hardware::{Parameter, ParameterId};
+use sapwise::algorithm::SimdLevel;
 
 pub(super) fn measure(options: &Options) -> Vec<Parameter> {
     let restricted = if options.threads.is_some() { ", lowered by the caller" } else { "" };

@@ -2,10 +2,10 @@
 
 use super::needed::needed;
 use super::{MethodModel, PredictError};
-use sapwise::internals::{Places, Residual};
 use crate::hardware::{Hardware, ParameterId};
 use sapwise::algorithm::{Backend, BackendClass};
 use sapwise::internals::{Fallback, Work};
+use sapwise::internals::{Places, Residual};
 use sapwise::tuning::{CostCurve, CostTerm};
 use std::sync::Arc;
 
@@ -28,7 +28,7 @@ impl MethodModel {
             let unit_ns = t.unit * t.scale.nanoseconds(hardware, backend)?;
             match terms.iter_mut().find(|c| c.term == t.term) {
                 Some(same) => same.unit_ns += unit_ns,
-                None => terms.push(CostTerm { term: t.term, unit_ns }),
+                None => terms.push(CostTerm::new(t.term, unit_ns)),
             }
         }
         let residual = (!self.residual.is_empty())

@@ -1,7 +1,7 @@
 //! Why a model is unusable, and why it can't predict.
 
-use sapwise::error::CurveError;
 use crate::hardware::HardwareError;
+use sapwise::error::CurveError;
 use std::fmt;
 
 /// What makes a model unusable, in a sentence that names the method, the range or the place.

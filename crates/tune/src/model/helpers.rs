@@ -3,12 +3,11 @@
 use super::PredictError;
 use super::needed::needed;
 use super::scale::cycle;
-use sapwise::internals::Helpers;
 use crate::hardware::{Hardware, ParameterId};
+use sapwise::internals::Helpers;
 
 /// How a method calls its helpers, shared by machines and numbers of threads.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[derive(serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub struct HelpersModel {
     /// Cycles of the caller for each helper that it calls.

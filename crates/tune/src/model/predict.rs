@@ -2,14 +2,14 @@
 
 use super::gpu_set::GpuSet;
 use super::{GPU_PREFIX, MethodModel, Model, PredictError, Range};
+use crate::GpuHardware;
 use crate::hardware::{Hardware, with_unit};
+use sapwise::algorithm::{Backend, BackendClass, Entry, Load};
 use sapwise::internals::GpuKind;
 use sapwise::internals::stats::NORMAL_90;
-use crate::GpuHardware;
-use sapwise::{AlgorithmId, Tuning};
-use sapwise::algorithm::{Backend, BackendClass, Entry, Load};
 use sapwise::internals::{Fallback, Work};
 use sapwise::tuning::{AlgorithmCost, Source};
+use sapwise::{AlgorithmId, Tuning};
 use std::sync::Arc;
 
 /// Cost curves for one machine.
@@ -102,7 +102,7 @@ impl Model {
                 gpus.extend(indices);
             }
             let spread_ln = method.spread_ln;
-            p.costs.push(AlgorithmCost { algorithm: id.clone(), revision: *revision, curve, spread_ln });
+            p.costs.push(AlgorithmCost::new(id.clone(), *revision, curve, spread_ln));
         }
         gpus.sort_unstable();
         gpus.dedup();

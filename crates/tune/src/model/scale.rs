@@ -4,8 +4,8 @@ use super::PredictError;
 use super::gpu_set::GpuSet;
 use super::needed::needed;
 use crate::hardware::{GpuParameterId, Hardware, ParameterId};
-use sapwise::named;
 use sapwise::algorithm::{Backend, BackendClass};
+use sapwise::named;
 
 named! {
     /// Nanoseconds of one unit of work on one thread of a machine or on some of its GPUs.

@@ -7,12 +7,12 @@ use crate::hardware::measure_hardware;
 use crate::prediction::{self, Slice};
 use crate::{output, revisions};
 use anyhow::{Context, bail};
-use sapwise::{AlgorithmId, Registry, Tuning};
 use sapwise::tuning::Source;
-use sapwise_tune::{GpuIdentity, measure};
+use sapwise::{AlgorithmId, Registry, Tuning};
 use sapwise_lab::data::{Document, read_document, usual_scenario};
 use sapwise_lab::fit::measured_tuning;
 use sapwise_scenes::Scenario;
+use sapwise_tune::{GpuIdentity, measure};
 use serde::Serialize;
 use std::path::Path;
 
@@ -82,8 +82,9 @@ pub(super) fn read(path: &Path, registry: &Registry, choice: &GpuChoice) -> anyh
         Document::Report(mut report) => {
             choice.restrict(&mut report);
             fresh(revisions::stale_in_report(&report, registry))?;
-            let tuning = measured_tuning(&report, usual_scenario(&report), sapwise_tune::Model::built_in().ok().as_ref())
-                .with_context(|| format!("{} yields no tuning", path.display()))?;
+            let tuning =
+                measured_tuning(&report, usual_scenario(&report), sapwise_tune::Model::built_in().ok().as_ref())
+                    .with_context(|| format!("{} yields no tuning", path.display()))?;
             let machine = &report.hardware.machine;
             let here = machine.physical_id == measure::machine().physical_id;
             let other_machine = (!here).then(|| machine.cpu.clone());

@@ -5,8 +5,8 @@ use crate::report::Label;
 use crate::synthetic::{Machine, gpu_truth, truth};
 use sapwise::AlgorithmId;
 use sapwise::tuning::Term;
-use sapwise_tune::{GpuKind, Model};
 use sapwise_tune::hardware::{GpuParameterId, ParameterId};
+use sapwise_tune::{GpuKind, Model};
 
 fn profiles(machines: impl IntoIterator<Item = Machine>) -> Vec<Profile> {
     machines.into_iter().map(|m| Profile::of(&format!("{}.json", m.name), &m.report())).collect()

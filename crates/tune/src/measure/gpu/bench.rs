@@ -4,11 +4,11 @@ use std::time::{Duration, Instant};
 
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
-use sapwise_gpu::{Gpu, GpuError, GpuErrorKind};
-pub(super) use sapwise_gpu::kernel::{Bound, Kernel};
 use crate::hardware::{GpuParameterId, Parameter};
-use sapwise::internals::GpuKind;
 use crate::measure::Options;
+use sapwise::internals::GpuKind;
+pub(super) use sapwise_gpu::kernel::{Bound, Kernel};
+use sapwise_gpu::{Gpu, GpuError, GpuErrorKind};
 
 pub(super) type Result<T> = std::result::Result<T, GpuError>;
 

@@ -7,9 +7,9 @@ use super::arithmetic::Arithmetic;
 use super::bench::{Bench, Bound, Result, broken, or_missing, record};
 use super::latency;
 use super::transfer::Transfer;
-use sapwise_gpu::Gpu;
 use crate::hardware::{GpuParameterId, Parameter};
 use crate::measure::Options;
+use sapwise_gpu::Gpu;
 
 /// Bytes of one upload.
 const UPLOAD_BYTES: u64 = 8 << 20;

@@ -3,8 +3,8 @@
 use std::time::Instant;
 
 use super::bench::{Bench, Result, broken, or_missing};
-use sapwise_gpu::{GpuError, GpuErrorKind};
 use crate::hardware::{GpuParameterId, Parameter};
+use sapwise_gpu::{GpuError, GpuErrorKind};
 
 pub(super) const SOURCE: &str = include_str!("shaders/latency.wgsl");
 

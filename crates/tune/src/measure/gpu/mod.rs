@@ -14,10 +14,10 @@ mod transfer;
 use std::time::{Duration, Instant};
 
 use super::Options;
-use sapwise_gpu::{Gpu, GpuError, GpuErrorKind, Gpus};
 use crate::hardware::{GpuGroup, GpuHardware, GpuParameterId, Parameter};
 use arithmetic::Arithmetic;
 use bench::Bench;
+use sapwise_gpu::{Gpu, GpuError, GpuErrorKind, Gpus};
 
 /// How long a real GPU works before anything is timed: an idle GPU clocks down.
 const WARM_UP: Duration = Duration::from_millis(50);

@@ -6,10 +6,10 @@
 use std::time::{Duration, Instant};
 
 use super::bench::{Bench, Result, broken, not_mapped, or_missing, per_ns};
-use sapwise_gpu::{GpuError, GpuErrorKind};
 use crate::hardware::{GpuParameterId, Parameter};
 use crate::measure::filled;
 use sapwise::internals::splitmix;
+use sapwise_gpu::{GpuError, GpuErrorKind};
 
 /// The size of the paper's transfers.
 const TOTAL_BYTES: u64 = 33_554_432;
