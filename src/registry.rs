@@ -161,7 +161,7 @@ impl Registry {
     ///
     /// Use this in a program that has the machine to itself. Some schedulers, above all those of virtual machines, wake
     /// two threads of a pool on one core and leave another idle for milliseconds. The command measures and runs with
-    /// pinned threads. It is off by default, also in `Adaptive::for_this_machine`, because a pinned thread can't leave
+    /// pinned threads. It is off by default, also in `sapwise_tune::for_this_machine`, because a pinned thread can't leave
     /// a core that another thread of the program keeps busy.
     pub fn pin_threads(&mut self) {
         self.threads.pinned = true;

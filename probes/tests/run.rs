@@ -30,7 +30,8 @@ fn costs(folder: &Path, threads: u32) -> PathBuf {
     let (one, many) = ("grid-sap@cpu1".to_owned(), format!("grid-sap@cpu{threads}"));
     let devices: Value = answer(sapwise().args(["devices", "--no-gpus", "--json"]));
     let own = devices["algorithms"].as_array().unwrap().iter().find(|a| a["id"] == "grid-sap@cpu1").unwrap();
-    let mut fixture: Value = serde_json::from_str(include_str!("../../tests/fixtures/tuning-2.json")).unwrap();
+    let mut fixture: Value =
+        serde_json::from_str(include_str!("../../crates/tune/tests/fixtures/tuning-2.json")).unwrap();
     let cost = |id: &str| json!({"algorithm": id, "revision": own["revision"], "work": 0, "helpers": null, "observed": null, "spread_ln": 0.1});
     fixture["costs"] = json!([cost(&one), cost(&many)]);
     fixture["crossovers"] = json!([]);

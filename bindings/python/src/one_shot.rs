@@ -67,7 +67,7 @@ impl Engine {
     fn new() -> Result<Self, Error> {
         let registry = Arc::new(Registry::new());
         let options = StartOptions::new().background(false).measure(None).registry(Arc::clone(&registry));
-        let mut tuning = Adaptive::for_this_machine(&options)?.tuning().clone();
+        let mut tuning = sapwise_tune::for_this_machine(&options)?.tuning().clone();
         tuning.costs.retain(|cost| cost.algorithm.method() != INCREMENTAL);
         let mut adaptive = Adaptive::new(if tuning.costs.is_empty() { usual(&registry)? } else { tuning }, &registry)?;
         adaptive.set_exploring(false);

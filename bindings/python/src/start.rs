@@ -45,7 +45,7 @@ impl Start {
                 Adaptive::only(parsed, &registry)?
             }
             (None, Some(tuning)) => Adaptive::new(tuning.clone(), &registry)?,
-            (None, None) => Adaptive::for_this_machine(&self.options.clone().registry(registry))?,
+            (None, None) => sapwise_tune::for_this_machine(&self.options.clone().registry(registry))?,
         };
         adaptive.set_learning(self.learning);
         adaptive.set_exploring(self.exploring);

@@ -243,7 +243,7 @@ pub(crate) fn predict(py: Python<'_>, cache: Option<&Bound<'_, PyAny>>, seconds:
     // On a thread, so that Ctrl-C is seen meanwhile. The thread ends by itself, within the seconds.
     let thread = std::thread::Builder::new().name("sapwise-predict".to_owned());
     let work = move || {
-        let made = Adaptive::for_this_machine(&options);
+        let made = sapwise_tune::for_this_machine(&options);
         let _ = done.send(made.map(|adaptive| (adaptive.tuning().clone(), adaptive.setup().clone())));
     };
     let thread = thread.spawn(work).map_err(|why| failed(py, format!("no thread can be started: {why}")))?;

@@ -162,10 +162,9 @@ pub(super) fn dispatched() -> u32 {
     DISPATCHED.get()
 }
 
-/// Fails the test unless wgpu takes the text as a shader. Needs no driver. Writes it to `NAME.wgsl` in the folder
+/// Panics unless wgpu takes the text as a shader. Needs no driver. Writes it to `NAME.wgsl` in the folder
 /// `SAPWISE_SHADERS`, if set, for the compilers of `tools/shader-check.sh`.
-#[cfg(test)]
-pub(crate) fn assert_valid(name: &str, text: &str) {
+pub fn assert_valid(name: &str, text: &str) {
     use wgpu::naga::{front, valid};
     let module = front::wgsl::parse_str(text).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(text)));
     assert!(!module.entry_points.is_empty(), "{name}");

@@ -103,11 +103,11 @@ impl Members {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sapwise::internals::{Scenario, Scene};
+    use sapwise_scenes::Scenario;
 
     #[test]
     fn every_pair_has_one_owner() {
-        let mut scene = Scene::start(Scenario::Clustered, 3000, 5);
+        let mut scene = Scenario::Clustered.start(3000, 5);
         scene.advance();
         let boxes = scene.boxes();
         let mut slabs = Slabs::default();

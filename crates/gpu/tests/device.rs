@@ -8,7 +8,7 @@ use common::gpu::upload;
 use common::{Random, gpus, naive};
 use sapwise::error::{GpuErrorKind, Unavailable};
 use sapwise::{Aabb, BroadPhase, Error, PairOrder, Pairs, Registry};
-use sapwise_gpu::{Gpu, GpuIdentity, Gpus, Resident, broad_phase, wgpu30 as wgpu};
+use sapwise_gpu::{Gpu, Gpus, Resident, broad_phase, wgpu30 as wgpu};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
 
@@ -214,34 +214,4 @@ fn given_gpus_are_listed_once_by_number() {
     let told = given.open_another(2).unwrap_err().to_string();
     assert!(told.contains("gpu2 is the program's own device"), "{told}");
     assert!(given.open(1).unwrap_err().to_string().contains("only gpu0, gpu2"));
-}
-
-/// Measuring the program's own device, within a limit, gets all that predictions read.
-#[test]
-fn a_given_gpu_is_measured_on_its_own_device() {
-    use sapwise_tune::hardware::GpuParameterId;
-    use sapwise_tune::measure::{self, Options};
-    let Some(gpus) = gpus() else { return };
-    let (device, queue) = device(&gpus, 0);
-    let given = Gpus::of([shared(0, &device, &queue)]);
-    let options = Options::default().with_limit(std::time::Duration::ZERO);
-    let measured = measure::gpu(&given, 0, &options).unwrap();
-    assert_eq!(measured.parameters.iter().map(|p| p.name.clone()).collect::<Vec<_>>(), GpuParameterId::OF_ONE);
-    for name in [
-        GpuParameterId::RoundTripNs,
-        GpuParameterId::ReadBackNs,
-        GpuParameterId::DispatchNs,
-        GpuParameterId::UploadGbPerS,
-        GpuParameterId::DownloadGbPerS,
-        GpuParameterId::ReadGbPerS,
-        GpuParameterId::CopyGbPerS,
-        GpuParameterId::ArithmeticGflopPerS,
-    ] {
-        // Its value may be 0: there is one sample, beside other tests.
-        assert!(measured.value(name).is_some(), "{name}: {:?}", measured.parameters);
-    }
-    let clock = measured.parameters.iter().find(|p| p.name == GpuParameterId::ClockGhz).unwrap();
-    assert!(clock.source.contains("time limit"));
-    assert!(gpus.adapter(0).is_some());
-    Own::new(&device, &queue).work();
 }

@@ -24,7 +24,7 @@ fn boxes(objects: usize, frame: usize) -> Vec<Aabb> {
 
 fn main() -> Result<(), Box<dyn Error>> {
     // By default this returns at once, and frames run with the usual tuning until a background thread has measured.
-    let mut broad_phase = Adaptive::for_this_machine(&StartOptions::new().background(false))?;
+    let mut broad_phase = sapwise_tune::for_this_machine(&StartOptions::new().background(false))?;
     let setup = broad_phase.setup();
     println!("tuning: {:?} after {:.2} s, file {:?}", setup.origin, setup.seconds, setup.file);
     setup.remarks.iter().for_each(|remark| println!("remark: {remark}"));

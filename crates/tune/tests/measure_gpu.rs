@@ -2,11 +2,11 @@
 //!
 //! Without a GPU these tests report that and pass; with `SAPWISE_REQUIRE_GPU=1` they fail.
 
-#[path = "../../../tests/common/mod.rs"]
+#[path = "../../gpu/tests/common/mod.rs"]
 mod common;
 
 use common::gpus;
-use sapwise_gpu::Gpus;
+use sapwise_gpu::{Gpu, Gpus, wgpu30 as wgpu};
 use sapwise_tune::hardware::GpuParameterId;
 use sapwise_tune::measure::{self, Options};
 use sapwise_tune::{GpuKind, How, Parameter};
@@ -109,4 +109,32 @@ fn the_whole_measurement() {
         println!("\n{all:?}, {:.2} s", start.elapsed().as_secs_f64());
         show(&group.parameters);
     }
+}
+
+/// Measuring the program's own device, within a limit, gets all that predictions read.
+#[test]
+fn a_given_gpu_is_measured_on_its_own_device() {
+    let Some(gpus) = gpus() else { return };
+    let opened = gpus.adapter(0).unwrap().request_device(&wgpu::DeviceDescriptor::default());
+    let (device, queue) = pollster::block_on(opened).unwrap();
+    let identity = sapwise_gpu::identity(0, &device.adapter_info());
+    let given = Gpus::of([Gpu::from_parts(device, queue, identity)]);
+    let options = Options::default().with_limit(std::time::Duration::ZERO);
+    let measured = measure::gpu(&given, 0, &options).unwrap();
+    assert_eq!(measured.parameters.iter().map(|p| p.name.clone()).collect::<Vec<_>>(), GpuParameterId::OF_ONE);
+    for name in [
+        GpuParameterId::RoundTripNs,
+        GpuParameterId::ReadBackNs,
+        GpuParameterId::DispatchNs,
+        GpuParameterId::UploadGbPerS,
+        GpuParameterId::DownloadGbPerS,
+        GpuParameterId::ReadGbPerS,
+        GpuParameterId::CopyGbPerS,
+        GpuParameterId::ArithmeticGflopPerS,
+    ] {
+        // Its value may be 0: there is one sample, beside other tests.
+        assert!(measured.value(name).is_some(), "{name}: {:?}", measured.parameters);
+    }
+    let clock = measured.parameters.iter().find(|p| p.name == GpuParameterId::ClockGhz).unwrap();
+    assert!(clock.source.contains("time limit"));
 }

@@ -3,6 +3,9 @@
 
 #[path = "../../../tests/common/mod.rs"]
 mod common;
+#[cfg(feature = "gpu")]
+#[path = "../../gpu/tests/common/mod.rs"]
+mod gpu_common;
 
 use common::{Random, naive};
 use sapwise::tuning::Source;
@@ -25,7 +28,7 @@ fn options(folder: &Path) -> StartOptions {
 }
 
 fn start(options: &StartOptions) -> Adaptive {
-    Adaptive::for_this_machine(options).unwrap()
+    sapwise_tune::for_this_machine(options).unwrap()
 }
 
 fn origin(adaptive: &Adaptive) -> Origin {
@@ -288,8 +291,7 @@ fn a_program_without_a_registry_gets_all_our_algorithms() {
 fn a_program_brings_its_pool_and_its_gpu() {
     use sapwise::rayon1 as rayon;
     use sapwise_gpu::{Gpu, Gpus, wgpu30 as wgpu};
-    use sapwise_tune::GpuIdentity;
-    let Some(gpus) = common::gpus() else { return };
+    let Some(gpus) = gpu_common::gpus() else { return };
     let folder = tempfile::tempdir().unwrap();
     let opened = gpus.adapter(0).unwrap().request_device(&wgpu::DeviceDescriptor::default());
     let (device, queue) = pollster::block_on(opened).unwrap();

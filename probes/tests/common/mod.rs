@@ -43,8 +43,8 @@ pub(crate) fn without_adapters(command: &mut Command) -> &mut Command {
 
 /// The answer of `sapwise devices --json` on a machine with an adapter. Without any: `None`, with a line that says so, or a
 /// failure with `SAPWISE_REQUIRE_GPU=1`.
-pub(crate) fn devices_with_a_gpu(test: &str) -> Option<serde_json::Value> {
-    let answer: serde_json::Value = serde_json::from_str(&success(sapwise().args(["devices", "--json"]))).unwrap();
+pub(crate) fn devices_with_a_gpu(test: &str) -> Option<Value> {
+    let answer: Value = serde_json::from_str(&success(sapwise().args(["devices", "--json"]))).unwrap();
     if answer["adapters"].as_array().unwrap().is_empty() {
         let required = std::env::var("SAPWISE_REQUIRE_GPU").is_ok_and(|v| v == "1");
         assert!(!required, "SAPWISE_REQUIRE_GPU=1, and no adapter was found: {}", answer["remark"]);

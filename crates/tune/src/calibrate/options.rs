@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Options of [`Adaptive::for_this_machine`](sapwise::Adaptive::for_this_machine).
+/// Options of [`for_this_machine`](crate::for_this_machine).
 ///
 /// ```
 /// use sapwise_tune::StartOptions;

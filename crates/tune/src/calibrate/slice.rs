@@ -41,12 +41,12 @@ pub(super) fn loads() -> Vec<Load> {
 mod tests {
     use super::*;
     use sapwise::algorithm::Displacement;
-    use sapwise::internals::{Scenario, Scene};
+    use sapwise_scenes::Scenario;
 
     #[test]
     fn stored_loads_are_those_of_the_scenario() {
         for stored in loads() {
-            let mut scene = Scene::start(Scenario::Uniform, stored.objects as usize, 1);
+            let mut scene = Scenario::Uniform.start(stored.objects as usize, 1);
             let mut displacement = Displacement::default();
             displacement.watch(scene.boxes());
             scene.advance();

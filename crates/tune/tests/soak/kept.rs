@@ -35,7 +35,7 @@ impl Kept {
             .registry(Arc::new(registry(machine.cores, &machine.slot)))
             // As briefly as possible: nobody looks at the values.
             .measure(Some(Duration::ZERO));
-        let mut adaptive = Adaptive::for_this_machine(&options).unwrap();
+        let mut adaptive = sapwise_tune::for_this_machine(&options).unwrap();
         life(&mut adaptive, &mut machine, frames, random, tally);
         // The thread in the background still has its memory.
         while adaptive.setup().origin == Origin::Awaited {

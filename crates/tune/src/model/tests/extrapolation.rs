@@ -51,7 +51,7 @@ fn a_thousand_cores_are_extrapolated() {
     assert!(p.extrapolated && p.costs.len() == 2, "{:?}", p.warnings);
     assert!(told(&p, "usable_cores is 1024") && told(&p, "has seen 1 threads at most"), "{:?}", p.warnings);
     assert!(told(&p, "`sapwise probe --out report.json`"), "{:?}", p.warnings);
-    let loads: Vec<Load> = (1..=20).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
+    let loads: Vec<Load> = (1..=20).map(|k| Load::of_objects(1 << k)).collect();
     assert_eq!(p.tuning("uniform", &loads).defect(), None);
     let p = both().predict(&machine(&[]), &ids(&["brute@cpu1"])).unwrap();
     assert!(!p.extrapolated && p.warnings.is_empty(), "{:?}", p.warnings);
