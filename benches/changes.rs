@@ -1,4 +1,5 @@
-//! What a filter and `Changes` cost beside finding the pairs: `clustered`, forth and back through a few frames, on one core.
+//! What a filter and `Changes` cost beside finding the pairs: `clustered`, forth and back through a few frames, on
+//! one core.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use sapwise::{Aabb, BroadPhase, Changes, Filter, Membership, PairOrder, Pairs, Registry};

@@ -1,4 +1,5 @@
-//! Runs each CPU method over the same frames, for `tools/instructions.py`, which counts their instructions under callgrind.
+//! Runs each CPU method over the same frames, for `tools/instructions.py`, which counts their instructions under
+//! callgrind.
 //!
 //! ```sh
 //! cargo run --release --example instructions -- uniform portable

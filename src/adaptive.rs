@@ -39,8 +39,9 @@ const SLICE: std::ops::RangeInclusive<u32> = 4..=24;
 
 /// A broad phase that runs whichever algorithm is expected to be cheapest for each frame.
 ///
-/// Every algorithm takes the same boxes and returns the same pairs, so a switch is invisible but for its speed. What is expected comes from
-/// [`Tuning`] and, where these have cost curves, from the times of the frames that were run: [`set_learning`](Self::set_learning).
+/// Every algorithm takes the same boxes and returns the same pairs, so a switch is invisible but for its speed. What
+/// is expected comes from [`Tuning`] and, where these have cost curves, from the times of the frames that were run:
+/// [`set_learning`](Self::set_learning).
 pub struct Adaptive {
     runner: Runner,
     /// How it came to its tuning.
@@ -50,11 +51,12 @@ pub struct Adaptive {
 impl Adaptive {
     /// An adaptive broad phase over those algorithms of `tuning` that `registry` can make.
     ///
-    /// An algorithm whose cost was found for another revision is left out, and so is one with more threads than the registry
-    /// lists: its cost says nothing about this build or this machine.
+    /// An algorithm whose cost was found for another revision is left out, and so is one with more threads than the
+    /// registry lists: its cost says nothing about this build or this machine.
     ///
     /// # Errors
-    /// [`Error::Unavailable`] or [`Error::UnknownAlgorithm`] when none can be made, [`Error::NoAlgorithm`] when none is named.
+    /// [`Error::Unavailable`] or [`Error::UnknownAlgorithm`] when none can be made, [`Error::NoAlgorithm`] when none
+    /// is named.
     pub fn new(tuning: Tuning, registry: &Registry) -> Result<Self, Error> {
         let mut made = Instances::of(&tuning, registry);
         made.failure().map_or_else(|| Ok(Self::with(tuning, made)), Err)
@@ -77,18 +79,23 @@ impl Adaptive {
         Self::new(tuning, registry)
     }
 
-    /// Whether the times of frames correct the expected costs. On unless it is turned off; what was learned until then stays in use.
+    /// Whether the times of frames correct the expected costs. On unless it is turned off; what was learned until
+    /// then stays in use.
     ///
-    /// Tuning without cost curves have nothing to correct, and decide by the number of objects always. On `wasm32-unknown-unknown`, which has
-    /// no clock, no frame is timed and nothing is learned.
+    /// Tuning without cost curves have nothing to correct, and decide by the number of objects always. On
+    /// `wasm32-unknown-unknown`, which has no clock, no frame is timed and nothing is learned.
     pub fn set_learning(&mut self, learns: bool) {
         self.runner.policy.set_learning(learns && clock::TICKS);
     }
 
-    /// Whether now and then another algorithm than the cheapest is tried, to learn what that one costs: in two frames, in eight where it goes on with what the
-    /// cheapest keeps, on another number of threads, or in up to 128 where it has to make first what it keeps, until they have cost two frames of the cheapest more than it would have. Only where what the trial is expected to tell may save more in the next 300 frames than it costs. What
-    /// trials and their decisions have cost is measured, and no other is made until that is no more than 0.5 % of the time of the frames and four frames, unless it
-    /// is expected to save 17 times its price and no more than eight frames are owed; a scene that suddenly is larger than all before counts as one that begins. On unless it is turned off; without [learning](Self::set_learning) it does nothing.
+    /// Whether now and then another algorithm than the cheapest is tried, to learn what that one costs: in two
+    /// frames, in eight where it goes on with what the cheapest keeps, on another number of threads, or in up to 128
+    /// where it has to make first what it keeps, until they have cost two frames of the cheapest more than it would
+    /// have. Only where what the trial is expected to tell may save more in the next 300 frames than it costs. What
+    /// trials and their decisions have cost is measured, and no other is made until that is no more than 0.5 % of the
+    /// time of the frames and four frames, unless it is expected to save 17 times its price and no more than eight
+    /// frames are owed; a scene that suddenly is larger than all before counts as one that begins. On unless it is
+    /// turned off; without [learning](Self::set_learning) it does nothing.
     pub fn set_exploring(&mut self, explores: bool) {
         self.runner.policy.set_exploring(explores);
     }
@@ -99,9 +106,9 @@ impl Adaptive {
         self.runner.policy.tuning()
     }
 
-    /// The tuning corrected by what was learned of the machine and of each algorithm, with the slice of scenes like the present one. What
-    /// passes is left out: another program on a core, cores that moved apart, how much this scene spares incremental algorithms. Those
-    /// that it began with where nothing was learned.
+    /// The tuning corrected by what was learned of the machine and of each algorithm, with the slice of scenes like
+    /// the present one. What passes is left out: another program on a core, cores that moved apart, how much this
+    /// scene spares incremental algorithms. Those that it began with where nothing was learned.
     #[must_use]
     pub fn learned(&self) -> Tuning {
         let tuning = self.runner.policy.tuning();
@@ -122,9 +129,10 @@ impl Adaptive {
         }
     }
 
-    /// Makes every algorithm again from this registry: one that was lost and is back, or all of them on a pool of another size. What was
-    /// learned stays, unless incremental algorithms came or went; what they kept from frame to frame is gone. A tuning that is still
-    /// awaited from the background brings algorithms of the registry that they were asked with.
+    /// Makes every algorithm again from this registry: one that was lost and is back, or all of them on a pool of
+    /// another size. What was learned stays, unless incremental algorithms came or went; what they kept from frame to
+    /// frame is gone. A tuning that is still awaited from the background brings algorithms of the registry that they
+    /// were asked with.
     ///
     /// # Errors
     /// As [`new`](Self::new); the algorithms of before stay then.
@@ -152,8 +160,9 @@ impl Adaptive {
         &self.start.setup
     }
 
-    /// Writes what was learned to the cache, for the next start on this machine: call it at the end of a session. Returns `false`
-    /// and writes nothing if the tuning of this machine has not arrived yet or could not be predicted.
+    /// Writes what was learned to the cache, for the next start on this machine: call it at the end of a session.
+    /// Returns `false` and writes nothing if the tuning of this machine has not arrived yet or could not be
+    /// predicted.
     ///
     /// # Errors
     /// When there is no cache or its file can't be written.
@@ -170,7 +179,8 @@ impl Adaptive {
 
     /// What was decided for the last frame; `None` before the first. As a text it is a sentence that tells why.
     ///
-    /// With the feature `tracing` every switch is an event with that text: target `sapwise::adaptive`, level DEBUG; trials have level TRACE.
+    /// With the feature `tracing` every switch is an event with that text: target `sapwise::adaptive`, level DEBUG;
+    /// trials have level TRACE.
     #[must_use]
     pub fn last_decision(&self) -> Option<Decision<'_>> {
         self.runner.last_decision()

@@ -1,5 +1,6 @@
-//! Cost curves: a frame costs a sum of terms, each a count of operations times nanoseconds per operation, times a residual over the
-//! load. Several threads change that cost by what calling helpers takes and how much they speed the work up.
+//! Cost curves: a frame costs a sum of terms, each a count of operations times nanoseconds per operation, times a
+//! residual over the load. Several threads change that cost by what calling helpers takes and how much they speed the
+//! work up.
 
 mod error;
 mod helpers;
@@ -17,8 +18,8 @@ pub use residual::{Places, Residual};
 pub(crate) use term::Counts;
 pub use term::{Product, Term};
 
-/// Most nanoseconds for one count: an hour for one object. Beyond it the arithmetic of a cost could overflow to infinity, and the
-/// difference of two infinities is no cost.
+/// Most nanoseconds for one count: an hour for one object. Beyond it the arithmetic of a cost could overflow to
+/// infinity, and the difference of two infinities is no cost.
 pub const MOST_UNIT_NS: f64 = 3.6e12;
 
 /// The cost of one algorithm on one machine as a function of the load.
@@ -33,7 +34,8 @@ pub struct CostCurve {
     pub observed: Option<Residual>,
 }
 
-/// The cost of a method on one thread of a machine or on some of its GPUs: a sum of terms times the exponential of a residual.
+/// The cost of a method on one thread of a machine or on some of its GPUs: a sum of terms times the exponential of a
+/// residual.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Work {
     /// Terms of the sum; none is negative.

@@ -8,7 +8,8 @@ use crate::named;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct GpuIdentity {
-    /// The number in `gpu0`, `gpu1` and so on: discrete GPUs first, software adapters last, otherwise in the driver's order.
+    /// The number in `gpu0`, `gpu1` and so on: discrete GPUs first, software adapters last, otherwise in the driver's
+    /// order.
     pub index: u32,
     /// Name that the driver reports.
     pub name: String,

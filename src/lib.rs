@@ -14,9 +14,9 @@
 //! # Ok::<(), sapwise::Error>(())
 //! ```
 //!
-//! A tuning is written by hand ([`Tuning::usual`], [`Tuning::from_steps`]) or comes from the crate `sapwise-tune`, which
-//! measures the hardware, predicts the tuning and saves it for the next start. The crate `sapwise-gpu` adds the methods
-//! on GPUs to a [`Registry`].
+//! A tuning is written by hand ([`Tuning::usual`], [`Tuning::from_steps`]) or comes from the crate `sapwise-tune`,
+//! which measures the hardware, predicts the tuning and saves it for the next start. The crate `sapwise-gpu` adds the
+//! methods on GPUs to a [`Registry`].
 //!
 //! # Features
 //!

@@ -33,9 +33,9 @@ pub struct Load {
     pub strip_candidates: f64,
     /// Overlapping pairs: those of the previous frame, or an estimate from the sample if there is none.
     pub pairs: f64,
-    /// Motion in a frame, 0 to 1, as [`Displacement::moved`](crate::algorithm::Displacement::moved) returns it: the mean over a
-    /// sample of the greatest displacement of a bound since the previous frame, in mean edges of the box, at most 1
-    /// each. 0: nothing moves. 1: no frame helps with the next, or the previous frame is unknown.
+    /// Motion in a frame, 0 to 1, as [`Displacement::moved`](crate::algorithm::Displacement::moved) returns it: the
+    /// mean over a sample of the greatest displacement of a bound since the previous frame, in mean edges of the box,
+    /// at most 1 each. 0: nothing moves. 1: no frame helps with the next, or the previous frame is unknown.
     pub moved: f64,
 }
 

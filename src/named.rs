@@ -118,7 +118,9 @@ macro_rules! named_in_schemas {
                 stringify!($name).into()
             }
 
-            fn json_schema(_: &mut $crate::internals::schemars::SchemaGenerator) -> $crate::internals::schemars::Schema {
+            fn json_schema(
+                _: &mut $crate::internals::schemars::SchemaGenerator,
+            ) -> $crate::internals::schemars::Schema {
                 $crate::internals::schemars::json_schema!({ "enum": Self::ALL.map(Self::as_str) })
             }
         }

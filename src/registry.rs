@@ -126,7 +126,8 @@ impl Registry {
         maker.filter(|maker| matches!(maker, Maker::One(_) | Maker::Family(_)))
     }
 
-    /// Adds the algorithms of a source, except those whose ids are listed already. It replaces an earlier source of the same type.
+    /// Adds the algorithms of a source, except those whose ids are listed already. It replaces an earlier source of
+    /// the same type.
     pub fn add_source<S: AlgorithmSource>(&mut self, source: S) {
         let is_old = |maker: &Maker| matches!(maker, Maker::Source(of) if *of == TypeId::of::<S>());
         let mut makers = self.makers.iter();
@@ -159,10 +160,10 @@ impl Registry {
     /// a free CPU when it finds the caller on its own core. Under the CPU quota of a cgroup no thread is pinned: the
     /// quota is for any CPU, and a pinned thread could not leave those that other containers use.
     ///
-    /// Use this in a program that has the machine to itself. Some schedulers, above all those of virtual machines, wake
-    /// two threads of a pool on one core and leave another idle for milliseconds. The command measures and runs with
-    /// pinned threads. It is off by default, also in `sapwise_tune::for_this_machine`, because a pinned thread can't leave
-    /// a core that another thread of the program keeps busy.
+    /// Use this in a program that has the machine to itself. Some schedulers, above all those of virtual machines,
+    /// wake two threads of a pool on one core and leave another idle for milliseconds. The command measures and runs
+    /// with pinned threads. It is off by default, also in `sapwise_tune::for_this_machine`, because a pinned thread
+    /// can't leave a core that another thread of the program keeps busy.
     pub fn pin_threads(&mut self) {
         self.threads.pinned = true;
     }

@@ -2,8 +2,8 @@
 //!
 //! NaN is left out: one failed division must not make a statistic unknown.
 
-/// Returns the `q`-quantile, `q` from 0 to 1, with linear interpolation between the two nearest samples (type 7 of Hyndman and Fan,
-/// the default of R and NumPy). `None` for no samples. A `q` outside 0 to 1 is clamped.
+/// Returns the `q`-quantile, `q` from 0 to 1, with linear interpolation between the two nearest samples (type 7 of
+/// Hyndman and Fan, the default of R and NumPy). `None` for no samples. A `q` outside 0 to 1 is clamped.
 #[must_use]
 pub fn quantile(samples: &[f64], q: f64) -> Option<f64> {
     let mut sorted: Vec<f64> = samples.iter().copied().filter(|x| !x.is_nan()).collect();
@@ -37,8 +37,8 @@ pub const NORMAL_90: f64 = 1.645;
 /// Standard deviation of a normal distribution over its median absolute deviation.
 const NORMAL_OVER_MAD: f64 = 1.4826;
 
-/// Returns a standard deviation that outliers don't move: the median absolute deviation from the median, scaled for a normal
-/// distribution. `None` for no samples.
+/// Returns a standard deviation that outliers don't move: the median absolute deviation from the median, scaled for a
+/// normal distribution. `None` for no samples.
 #[must_use]
 pub fn robust_deviation(samples: &[f64]) -> Option<f64> {
     let middle = median(samples)?;
@@ -52,8 +52,8 @@ pub fn normal_density(x: f64) -> f64 {
     (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt()
 }
 
-/// Returns the probability that a standard normal variable exceeds `x`, with a relative error of 1.2e-7 for `x` of at least zero (Press
-/// and others, Numerical Recipes in C, 1992, chapter 6.2).
+/// Returns the probability that a standard normal variable exceeds `x`, with a relative error of 1.2e-7 for `x` of at
+/// least zero (Press and others, Numerical Recipes in C, 1992, chapter 6.2).
 #[must_use]
 pub fn normal_tail(x: f64) -> f64 {
     if x < 0.0 {

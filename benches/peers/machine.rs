@@ -10,8 +10,8 @@ use sapwise_tune::{Hardware, Model};
 use std::process::Command;
 use std::sync::Arc;
 
-/// The tuning for a number of threads that the built-in model predicts from hardware parameters, which are measured now; written
-/// down by hand where nothing is timed.
+/// The tuning for a number of threads that the built-in model predicts from hardware parameters, which are measured
+/// now; written down by hand where nothing is timed.
 ///
 /// # Errors
 /// When nothing can be predicted.

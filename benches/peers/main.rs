@@ -13,10 +13,10 @@
 //! | `SAPWISE_BENCH_SECONDS` | time for the timed frames of a scenario at a size |
 //! | `SAPWISE_RESULTS` | folder for `peers.csv` and `peers.md`; without it the ratios are printed |
 //!
-//! Method and bias stand at the head of `BENCHMARKS.md`. Prints a line for each scenario and size as soon as it is measured.
-//! Criterion times its candidates one after the other, which is why it is not used here. Without `--bench`, which `cargo
-//! bench` passes, only the smallest size is run for a few frames, to see that all is well. Exit status 1 when a
-//! contestant failed or found other pairs than the rest.
+//! Method and bias stand at the head of `BENCHMARKS.md`. Prints a line for each scenario and size as soon as it is
+//! measured. Criterion times its candidates one after the other, which is why it is not used here. Without `--bench`,
+//! which `cargo bench` passes, only the smallest size is run for a few frames, to see that all is well. Exit status 1
+//! when a contestant failed or found other pairs than the rest.
 
 mod contestants;
 #[allow(

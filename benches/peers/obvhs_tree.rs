@@ -1,7 +1,7 @@
 //! obvhs's `Bvh2`, whose pairs are found by one query for each leaf: it has no traversal of a tree against itself.
 //!
-//! Its feature `parallel` spreads the build over rayon's threads and changes the sort on one thread too, so that one program can't
-//! have both forms; it is off. On two threads the queries are spread here, and the build stays on one.
+//! Its feature `parallel` spreads the build over rayon's threads and changes the sort on one thread too, so that one
+//! program can't have both forms; it is off. On two threads the queries are spread here, and the build stays on one.
 
 use obvhs::aabb::Aabb as Bounds;
 use obvhs::bvh2::Bvh2;

@@ -29,8 +29,8 @@ fn bounds(b: &Aabb) -> Bounds {
     Bounds::new(b.min.into(), b.max.into())
 }
 
-/// Makes the leaves as many as the boxes: a new tree where more than `few` come or go, since one by one they take longer; else those
-/// beyond the last box are removed, and new ones are inserted when they are updated.
+/// Makes the leaves as many as the boxes: a new tree where more than `few` come or go, since one by one they take
+/// longer; else those beyond the last box are removed, and new ones are inserted when they are updated.
 fn resize(tree: &mut Bvh, boxes: &[Aabb], few: usize) {
     let (before, now) = (tree.leaf_count() as usize, boxes.len());
     if before.abs_diff(now) > few {
@@ -77,7 +77,8 @@ impl BroadPhase for Parry {
     }
 }
 
-/// [`Parry`] on a pool: updates, refit and traversal have a parallel form, `optimize_incremental` and `rebuild` have none.
+/// [`Parry`] on a pool: updates, refit and traversal have a parallel form, `optimize_incremental` and `rebuild` have
+/// none.
 pub(crate) struct ParallelParry {
     upkeep: Upkeep,
     pool: Arc<ThreadPool>,
@@ -119,16 +120,16 @@ impl BroadPhase for ParallelParry {
     }
 }
 
-/// Leaves larger than their boxes by this share of the box's edge on each side. In `uniform` and `resting` half of it is slower or as
-/// fast.
+/// Leaves larger than their boxes by this share of the box's edge on each side. In `uniform` and `resting` half of it
+/// is slower or as fast.
 const MARGIN: f32 = 0.2;
 
-/// Frames from one step of `optimize_incremental` to the next: parry's documentation asks for 5 to 10; in each frame is slower in
-/// `uniform` and `resting`.
+/// Frames from one step of `optimize_incremental` to the next: parry's documentation asks for 5 to 10; in each frame
+/// is slower in `uniform` and `resting`.
 const OPTIMISE_EVERY: u32 = 5;
 
-/// The scheme of rapier's broad phase: leaves with a margin, a traversal only where a box left its leaf, and a list of near pairs
-/// that is kept from frame to frame; those of them that overlap are the pairs.
+/// The scheme of rapier's broad phase: leaves with a margin, a traversal only where a box left its leaf, and a list
+/// of near pairs that is kept from frame to frame; those of them that overlap are the pairs.
 pub(crate) struct Margin {
     tree: Bvh,
     workspace: BvhWorkspace,

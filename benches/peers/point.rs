@@ -21,7 +21,8 @@ pub(crate) struct Point {
     pub(crate) choices: Vec<String>,
     /// Names of those who left, since a frame took too long.
     pub(crate) left: Vec<String>,
-    /// Share of the CPU, 0 to 1, that other programs took during the timed frames. `None` where they were too short to tell.
+    /// Share of the CPU, 0 to 1, that other programs took during the timed frames. `None` where they were too short
+    /// to tell.
     pub(crate) foreign_load: Option<f64>,
 }
 

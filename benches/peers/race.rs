@@ -21,8 +21,8 @@ const WARM_UP_OF_ALL: u64 = 2;
 /// Who takes longer for a frame leaves.
 const LONGEST_FRAME: Duration = Duration::from_secs(3);
 
-/// A frame is hopeless that takes longer than this and [`HOPELESS_RATIO`] times as long as that of the fastest: trees that are refitted
-/// and nothing else come to that where objects move far.
+/// A frame is hopeless that takes longer than this and [`HOPELESS_RATIO`] times as long as that of the fastest: trees
+/// that are refitted and nothing else come to that where objects move far.
 const HOPELESS_FRAME: Duration = Duration::from_millis(50);
 const HOPELESS_RATIO: u32 = 20;
 
@@ -44,8 +44,8 @@ struct Race {
 }
 
 impl Race {
-    /// Runs all, or only those who keep something, on these boxes in random order. The time that each of them took, and `None` for
-    /// those who did not run.
+    /// Runs all, or only those who keep something, on these boxes in random order. The time that each of them took,
+    /// and `None` for those who did not run.
     fn frame(&mut self, boxes: &[Aabb], all: bool) -> Result<Vec<Option<Duration>>, String> {
         let mut taken = vec![None; self.contestants.len()];
         let mut expected: Option<u64> = None;
@@ -96,8 +96,9 @@ fn is_at_peak(scene: &Scene) -> bool {
 
 /// Runs the contestants through a scenario at a size.
 ///
-/// The scene goes on from frame to frame, so that who keeps the work of the last frame finds objects where they never were before. In
-/// `fragmentation` the frames at the peak are timed; those who keep something go through the others too.
+/// The scene goes on from frame to frame, so that who keeps the work of the last frame finds objects where they never
+/// were before. In `fragmentation` the frames at the peak are timed; those who keep something go through the others
+/// too.
 ///
 /// # Errors
 /// When a contestant fails or finds other pairs than the rest.

@@ -1,5 +1,5 @@
-//! Any text as a file of Sapwise, and what follows: tuning runs, models predict, reports are measured tuning, and what is read is read
-//! again as it was written.
+//! Any text as a file of Sapwise, and what follows: tuning runs, models predict, reports are measured tuning, and
+//! what is read is read again as it was written.
 #![no_main]
 
 use libfuzzer_sys::{fuzz_mutator, fuzz_target, fuzzer_mutate};

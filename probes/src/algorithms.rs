@@ -13,10 +13,10 @@ type Factory = Arc<dyn Fn(u32) -> Result<Box<dyn BroadPhase>, Error> + Send + Sy
 /// An algorithm that a user's program adds to the command.
 ///
 /// `method` is 1 to 32 of `a-z`, `0-9`, `-` and `_`, begins with a letter, and is no name of the library's. Increase
-/// `revision` whenever the speed changes: reports and models of other revisions are stale then. Each process that runs
-/// the algorithm calls the factory; an error leaves the algorithm out with a remark. An algorithm with kernels of
-/// several vector widths should ask [`SimdLevel::in_use`](sapwise::algorithm::SimdLevel::in_use), so that `SAPWISE_SIMD` restricts
-/// it too.
+/// `revision` whenever the speed changes: reports and models of other revisions are stale then. Each process that
+/// runs the algorithm calls the factory; an error leaves the algorithm out with a remark. An algorithm with kernels
+/// of several vector widths should ask [`SimdLevel::in_use`](sapwise::algorithm::SimdLevel::in_use), so that
+/// `SAPWISE_SIMD` restricts it too.
 #[derive(Clone)]
 pub struct UserAlgorithm {
     method: String,

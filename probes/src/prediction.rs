@@ -148,7 +148,8 @@ fn unknown(algorithms: &Algorithms, registry: &Registry, model: &Model) -> Vec<S
         if id.is_ok_and(|id| model.method(&id).is_none()) {
             warnings.push(format!(
                 "{method} is not predicted: the model {} was trained on reports without it. Measure it with this \
-                 program: `probe --out own.json`, `train own.json --out own-model.json`, then `predict --model own-model.json`",
+                 program: `probe --out own.json`, `train own.json --out own-model.json`, then `predict --model \
+                 own-model.json`",
                 model.name
             ));
         }

@@ -113,7 +113,8 @@ fn a_gpu_is_taken_by_its_number_and_one_that_is_not_there_is_wrong_usage() {
     let last = devices["adapters"].as_array().unwrap().last().unwrap()["index"].as_u64().unwrap() as u32;
     let one = report(sapwise().args(TINY).args(["--gpu", &last.to_string()]));
     assert_eq!(one.hardware.gpus.iter().map(|g| g.gpu.index).collect::<Vec<_>>(), [last], "{:?}", one.remarks);
-    let others = |id: &sapwise::AlgorithmId| matches!(id.backend(), sapwise::algorithm::Backend::Gpu(list) if list[..] != [last]);
+    use sapwise::algorithm::Backend;
+    let others = |id: &sapwise::AlgorithmId| matches!(id.backend(), Backend::Gpu(list) if list[..] != [last]);
     assert!(!one.algorithms.iter().any(|t| others(&t.id)), "{:?}", one.algorithms);
 }
 
@@ -178,8 +179,10 @@ fn tuning_for_a_missing_gpu_is_run_on_the_rest() {
     let folder = tempfile::tempdir().unwrap();
     let step = |from: u32, id: &str| json!({"from_objects": from, "algorithm": id});
     let tuning = json!({
-        "schema": "tuning/2", "source": "default", "model": null, "extrapolated": false, "warnings": [], "scenario": "uniform",
-        "steps": [step(0, "brute@cpu1"), step(100, "grid-sap@gpu99")], "crossovers": [], "interval_basis": "", "costs": []
+        "schema": "tuning/2", "source": "default", "model": null, "extrapolated": false,
+        "warnings": [], "scenario": "uniform",
+        "steps": [step(0, "brute@cpu1"), step(100, "grid-sap@gpu99")],
+        "crossovers": [], "interval_basis": "", "costs": []
     });
     let path = folder.path().join("tuning.json");
     fs::write(&path, tuning.to_string()).unwrap();

@@ -167,7 +167,8 @@ fn a_prediction_that_is_killed_leaves_the_old_tuning() {
 #[test]
 fn a_run_that_is_killed_leaves_its_old_files() {
     let (_folder, out, [report, _]) = folders();
-    let words = "run uniform --objects 300 --frames 40 --repeats 2 --no-gpus --record r.npy --trace t.csv --plot p.svg --tuning";
+    let words = "run uniform --objects 300 --frames 40 --repeats 2 --no-gpus --record r.npy --trace t.csv --plot \
+        p.svg --tuning";
     let words: Vec<&str> = words.split(' ').chain([report.as_str()]).collect();
     kill_and_look(&words, &out, 3);
 }

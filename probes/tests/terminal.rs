@@ -7,8 +7,8 @@ use std::fs;
 #[cfg(target_os = "linux")]
 use std::process::Command;
 
-/// Returns what the prediction for a report shows on a terminal of a width. `None`, with a line that says so, without the
-/// program `script`, which makes a terminal.
+/// Returns what the prediction for a report shows on a terminal of a width. `None`, with a line that says so, without
+/// the program `script`, which makes a terminal.
 #[cfg(target_os = "linux")]
 fn on_a_terminal(columns: u32, variables: &[(&str, &str)]) -> Option<String> {
     let quoted = |text: &str| format!("'{text}'");

@@ -21,8 +21,8 @@ pub enum Reason {
     Explored,
     /// The one that was chosen failed in this frame.
     FellBack,
-    /// A frame of the one before cost far more than was expected of it: this one is the cheapest of the others, most often a tree, whose cost
-    /// does not depend on where the boxes lie.
+    /// A frame of the one before cost far more than was expected of it: this one is the cheapest of the others, most
+    /// often a tree, whose cost does not depend on where the boxes lie.
     Sheltered,
 }
 
@@ -46,10 +46,11 @@ impl fmt::Display for Reason {
 pub struct Decision<'a> {
     /// The algorithm that ran.
     pub algorithm: &'a AlgorithmId,
-    /// Its expected cost in nanoseconds, corrected by what was learned; `None` where only the number of objects decides.
+    /// Its expected cost in nanoseconds, corrected by what was learned; `None` where only the number of objects
+    /// decides.
     pub predicted_ns: Option<f64>,
-    /// What the frame took in nanoseconds. `None` where it was not timed: in frames so short that the clock would cost more than
-    /// 0.25 % of them only some are.
+    /// What the frame took in nanoseconds. `None` where it was not timed: in frames so short that the clock would
+    /// cost more than 0.25 % of them only some are.
     pub measured_ns: Option<f64>,
     /// The cheapest of the others and its expected cost in nanoseconds.
     pub runner_up: Option<(&'a AlgorithmId, f64)>,

@@ -8,8 +8,8 @@ use crate::load::Load;
 use crate::tuning::AlgorithmCost;
 use crate::tuning::belief::View;
 
-/// What is predicted of a load holds for another that differs by no more than this share: costs are known less well than that. Its correction holds for
-/// so many frames: waits pass, whether anything is observed or not.
+/// What is predicted of a load holds for another that differs by no more than this share: costs are known less well
+/// than that. Its correction holds for so many frames: waits pass, whether anything is observed or not.
 const ALIKE: f64 = 0.01;
 const HOLDS: u64 = 64;
 

@@ -1,14 +1,15 @@
 //! Frames of one algorithm, added up until they tell its cost.
 //!
-//! An incremental algorithm runs cheap frames for a while and then an expensive one, in which it rebuilds. What counts is their mean, so that
-//! frames are added up before they are compared with what was expected.
+//! An incremental algorithm runs cheap frames for a while and then an expensive one, in which it rebuilds. What
+//! counts is their mean, so that frames are added up before they are compared with what was expected.
 
 use crate::tuning::belief::View;
 
 /// Frames that are added up where an algorithm runs on, and right after it began.
 const MOST: u32 = 32;
 const FEWEST: u32 = 2;
-/// What counts of a frame, at most: this many times what the dearest kind of frame is expected to cost. The rest is another program's.
+/// What counts of a frame, at most: this many times what the dearest kind of frame is expected to cost. The rest is
+/// another program's.
 pub(super) const MOST_OVER: f64 = 2.0;
 
 /// What the tuning says of a frame, without any correction, in nanoseconds: all of it, and the calls in it.
@@ -50,7 +51,8 @@ pub(super) struct FrameBatch {
 }
 
 impl FrameBatch {
-    /// The mean load, as what is learned sees it: each frame counts by what is predicted of it, as it does in the ratio of the sums.
+    /// The mean load, as what is learned sees it: each frame counts by what is predicted of it, as it does in the
+    /// ratio of the sums.
     pub(super) fn view(&self) -> View {
         let mut mean = View::default();
         mean.add(&self.view, share(1.0, self.predicted_ns));

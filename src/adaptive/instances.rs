@@ -17,7 +17,8 @@ pub(crate) struct Candidate {
     pub(super) instance: Option<usize>,
 }
 
-/// Runs one candidate, or several that differ in their number of threads only and share what they keep from frame to frame.
+/// Runs one candidate, or several that differ in their number of threads only and share what they keep from frame to
+/// frame.
 pub(crate) struct Instance {
     place: Place,
     /// Whether it may wait for a driver while it gets ready.
@@ -28,7 +29,8 @@ pub(crate) struct Instance {
     threads: Option<u32>,
     /// Objects that its buffers are ready for.
     ready: usize,
-    /// The first frame since its last one that another one ran and of which it was not told; `None` while it goes on, and before its first.
+    /// The first frame since its last one that another one ran and of which it was not told; `None` while it goes on,
+    /// and before its first.
     left_at: Option<u64>,
 }
 
@@ -123,7 +125,8 @@ impl Instance {
         Ok(self.work())
     }
 
-    /// Finds the pairs of a frame of which nothing was worked out, for the same candidate as in the last frame. `None` where that can't run.
+    /// Finds the pairs of a frame of which nothing was worked out, for the same candidate as in the last frame.
+    /// `None` where that can't run.
     pub(super) fn go_on(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Option<Result<Option<FrameWork>, Error>> {
         let algorithm = self.place.here()?;
         let found = algorithm.find_pairs(boxes, pairs).map(|()| self.work());
@@ -131,7 +134,8 @@ impl Instance {
         Some(found)
     }
 
-    /// How the last frame came about, where one may build on the one before. Checked once more: the fields are anybody's to set.
+    /// How the last frame came about, where one may build on the one before. Checked once more: the fields are
+    /// anybody's to set.
     fn work(&mut self) -> Option<FrameWork> {
         let algorithm = self.place.here().filter(|_| self.is_incremental)?;
         let work = algorithm.last_frame();
@@ -148,7 +152,8 @@ pub struct Instances {
 }
 
 impl Instances {
-    /// Of each candidate where it finds what the frame before left: one number for all that share it. `None` where nothing is kept.
+    /// Of each candidate where it finds what the frame before left: one number for all that share it. `None` where
+    /// nothing is kept.
     pub(super) fn kept(&self) -> Vec<Option<usize>> {
         let keeps = |c: &Candidate| c.instance.filter(|&k| self.instances[k].is_incremental);
         self.candidates.iter().map(keeps).collect()

@@ -9,30 +9,33 @@ use crate::tuning::belief::{Belief, Deviations, MOST_SURPRISE, Running, View};
 
 /// Frames after which half of what was seen of waits is forgotten.
 const WAIT_FRAMES: f64 = 800.0;
-/// Share of each frame in the mean time that frames of a width wait for other programs, and batches of an algorithm before its frames count
-/// for that: until then what is dearer than expected was expected wrongly.
+/// Share of each frame in the mean time that frames of a width wait for other programs, and batches of an algorithm
+/// before its frames count for that: until then what is dearer than expected was expected wrongly.
 const WAIT_SHARE: f64 = 1.0 / 128.0;
 const KNOWN: u32 = 4;
 
-/// A frame that takes so many times what the dearest kind of it is expected to, the latter before the algorithm is known, and of which there was
-/// no other for so many frames, is a stall: a page from disk, a breakpoint, another program. It tells nothing of any algorithm. Those that
-/// come again are waits of its width.
+/// A frame that takes so many times what the dearest kind of it is expected to, the latter before the algorithm is
+/// known, and of which there was no other for so many frames, is a stall: a page from disk, a breakpoint, another
+/// program. It tells nothing of any algorithm. Those that come again are waits of its width.
 const STALL: [f64; 2] = [MOST_OVER, 64.0];
 const STALLS_APART: u64 = 50;
 
-/// The noise of a frame: standard deviation of its logarithm around what is expected of it. To learn it for each algorithm is worth nothing: docs/methodology.md.
-/// With twice as much, one frame of a trial tells so little that the same algorithm was tried five times in one real run.
+/// The noise of a frame: standard deviation of its logarithm around what is expected of it. To learn it for each
+/// algorithm is worth nothing: docs/methodology.md. With twice as much, one frame of a trial tells so little that the
+/// same algorithm was tried five times in one real run.
 const NOISE_LN: f64 = 0.2;
 /// Of this many frames in a row the mean is as noisy as of this power of their number far apart.
 const ALIKE: f64 = 0.7;
 
-/// What keeps work takes another time in its first frames than later: it is yet to find what to keep. In a level of 3000 boxes that loads, `pair-cache` took
-/// 220 to 280 us a frame in its first thirty and 185 from then on. So the first ones count for less: standard deviation of the logarithm by which they are
-/// off at the beginning, and frames in which that falls to an e-th.
+/// What keeps work takes another time in its first frames than later: it is yet to find what to keep. In a level of
+/// 3000 boxes that loads, `pair-cache` took 220 to 280 us a frame in its first thirty and 185 from then on. So the
+/// first ones count for less: standard deviation of the logarithm by which they are off at the beginning, and frames
+/// in which that falls to an e-th.
 const UNSETTLED_LN: f64 = 0.3;
 const SETTLING_FRAMES: f64 = 32.0;
 
-/// This many surprises in a row that are too large to be believed, all to the same side, are no accident: the machine or the scene has changed.
+/// This many surprises in a row that are too large to be believed, all to the same side, are no accident: the machine
+/// or the scene has changed.
 const NO_ACCIDENT: u32 = 3;
 
 /// What is known about one algorithm's frames beside their cost.
@@ -47,7 +50,8 @@ struct Frames {
     kept: Option<usize>,
 }
 
-/// Variance of the mean of the logarithms of so many frames in a row. They are alike, so that many of them tell less than as many that were far apart.
+/// Variance of the mean of the logarithms of so many frames in a row. They are alike, so that many of them tell less
+/// than as many that were far apart.
 fn noise(frames: u32) -> f64 {
     NOISE_LN.powi(2) / f64::from(frames).powf(ALIKE)
 }
@@ -118,15 +122,16 @@ impl Learner {
         self.belief.view(frame)
     }
 
-    /// Mean time that a frame of an algorithm waits for other programs, in nanoseconds. A helper whose core another program has waits
-    /// until the scheduler's next turn, however short the frame: a hundred times as long as some. The mean is what counts, so that this is not
-    /// noise, and it is no factor either.
+    /// Mean time that a frame of an algorithm waits for other programs, in nanoseconds. A helper whose core another
+    /// program has waits until the scheduler's next turn, however short the frame: a hundred times as long as some.
+    /// The mean is what counts, so that this is not noise, and it is no factor either.
     pub(super) fn wait_ns(&self, algorithm: usize, frame: u64) -> f64 {
         let Wait { mean_ns, at, .. } = self.waits[self.frames[algorithm].wait];
         mean_ns / (1.0 + frame.saturating_sub(at) as f64 / WAIT_FRAMES)
     }
 
-    /// By how much the mean of the next so many frames of an algorithm may be off for being among its first: the variance of its logarithm.
+    /// By how much the mean of the next so many frames of an algorithm may be off for being among its first: the
+    /// variance of its logarithm.
     fn settle(&mut self, algorithm: usize, frames: u32) -> f64 {
         self.frames[algorithm].kept.map_or(0.0, |kept| {
             let since = &mut self.since[kept];
@@ -160,24 +165,26 @@ impl Learner {
         }
     }
 
-    /// Expected natural logarithm of real over predicted time, waits left out, of an algorithm of whose predicted time calls are that share.
+    /// Expected natural logarithm of real over predicted time, waits left out, of an algorithm of whose predicted
+    /// time calls are that share.
     pub(super) fn correction_ln(&self, algorithm: usize, view: &View, calls: f64) -> f64 {
         self.belief.deviation_ln(algorithm, view, calls)
     }
 
-    /// An algorithm that runs, of whose predicted time calls are that share, for [`told_of_ratio`](Self::told_of_ratio).
+    /// An algorithm that runs, of whose predicted time calls are that share, for
+    /// [`told_of_ratio`](Self::told_of_ratio).
     pub(super) fn running(&self, algorithm: usize, view: &View, calls: f64) -> Running {
         self.belief.running(algorithm, view, calls)
     }
 
-    /// What so many frames in a row of another algorithm would tell of the logarithm of its cost over that of the one that runs: the standard deviation of
-    /// by how much they correct it.
+    /// What so many frames in a row of another algorithm would tell of the logarithm of its cost over that of the one
+    /// that runs: the standard deviation of by how much they correct it.
     pub(super) fn told_of_ratio(&self, running: &Running, tried: usize, view: &View, calls: f64, frames: u32) -> f64 {
         self.belief.told_of_ratio(running, tried, view, calls, noise(frames))
     }
 
-    /// Takes in that some frames took the algorithm longer or shorter than was predicted without correction. Whether that surprised no more than can be
-    /// believed at once.
+    /// Takes in that some frames took the algorithm longer or shorter than was predicted without correction. Whether
+    /// that surprised no more than can be believed at once.
     pub(super) fn observe(&mut self, batch: &FrameBatch, frame: u64) -> bool {
         let (algorithm, ratio) = (batch.candidate, batch.real_ns / batch.predicted_ns);
         if !(ratio.is_finite() && ratio > 0.0) {
@@ -200,8 +207,8 @@ impl Learner {
         if a.run.unsigned_abs() < NO_ACCIDENT {
             self.belief.absorb(algorithm, surprise.clamp(-most, most), variance);
         } else {
-            // What was observed holds no longer: the next frames count as if they were the first. And what shared parts have not explained until now is more
-            // likely the algorithm's own.
+            // What was observed holds no longer: the next frames count as if they were the first. And what shared
+            // parts have not explained until now is more likely the algorithm's own.
             a.run = 0;
             self.belief.doubt_shared();
             self.belief.doubt_own(algorithm, surprise);

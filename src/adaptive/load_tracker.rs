@@ -9,12 +9,13 @@ use crate::clock::Instant;
 use crate::clock::counted;
 use crate::load::{FramePlan, Load};
 
-/// Share of the frames' time that samples may take where the number of objects holds still. With [`SHARE_OF_DRIFT`] a scene that doubles is
-/// sampled when 45 times the sample's cost has passed, one that grows by a sixteenth after 310 times.
+/// Share of the frames' time that samples may take where the number of objects holds still. With [`SHARE_OF_DRIFT`] a
+/// scene that doubles is sampled when 45 times the sample's cost has passed, one that grows by a sixteenth after 310
+/// times.
 const SHARE: f64 = 0.002;
 
-/// A sample that the system interrupts looks dear. Taken at its word it would put off the next one for seconds of frames, over
-/// which a change of the scene goes unseen.
+/// A sample that the system interrupts looks dear. Taken at its word it would put off the next one for seconds of
+/// frames, over which a change of the scene goes unseen.
 const COST_RISES: f64 = 2.0;
 
 /// Samples are at least this many frames apart where nothing drifts: what `moved` tells changes slowly.
@@ -26,7 +27,8 @@ const SAMPLE_EVERY: u32 = 32;
 #[derive(Debug, Clone, Default)]
 pub(super) struct LoadTracker {
     throttle: DecisionThrottle,
-    /// The next frame is to show how far boxes move. Stands here, for a frame without a decision does not ask `motion`, which lies in other lines of memory.
+    /// The next frame is to show how far boxes move. Stands here, for a frame without a decision does not ask
+    /// `motion`, which lies in other lines of memory.
     watching: bool,
     load: Load,
     /// What was worked out about the next frame.
@@ -91,7 +93,8 @@ impl LoadTracker {
         self.throttle.decide(objects);
     }
 
-    /// Looks how far the boxes of a frame have moved, where those of the frame before were remembered. Whether they move at another pace.
+    /// Looks how far the boxes of a frame have moved, where those of the frame before were remembered. Whether they
+    /// move at another pace.
     fn look(&mut self, boxes: &[Aabb]) -> bool {
         std::mem::take(&mut self.watching) && self.motion.look(boxes)
     }
@@ -108,8 +111,8 @@ impl LoadTracker {
         self.before.is_none() || rested && self.passed_ns * (SHARE + SHARE_OF_DRIFT * drift) >= self.sample_ns
     }
 
-    /// Takes note of a frame that ran without a decision, the last of those that have `passed`, and of its overlapping pairs, those that a filter kept
-    /// out included.
+    /// Takes note of a frame that ran without a decision, the last of those that have `passed`, and of its
+    /// overlapping pairs, those that a filter kept out included.
     pub(super) fn passes(&mut self, boxes: &[Aabb], pairs: u64, passed: &Passed) {
         self.throttle.ran(count(boxes), pairs);
         // A look alone takes a tenth of a decision, and most looks find the pace of before.
@@ -135,8 +138,8 @@ impl LoadTracker {
         self.motion.passed(ns);
     }
 
-    /// Takes in a frame that was decided on, or stood out among those that were not: its overlapping pairs, those that a filter kept out included, and how long
-    /// it took in nanoseconds.
+    /// Takes in a frame that was decided on, or stood out among those that were not: its overlapping pairs, those
+    /// that a filter kept out included, and how long it took in nanoseconds.
     pub(super) fn ran(&mut self, boxes: &[Aabb], pairs: u64, ns: f64) {
         // One that was not decided on: the next one would be compared with the one before it.
         self.look(boxes);
@@ -150,7 +153,8 @@ impl LoadTracker {
         self.watching |= self.motion.ran(boxes);
     }
 
-    /// What of the last decision, which took so many nanoseconds, was no sample: samples have a share of the time of their own.
+    /// What of the last decision, which took so many nanoseconds, was no sample: samples have a share of the time of
+    /// their own.
     pub(super) fn without_sample(&self, decision_ns: f64) -> f64 {
         (decision_ns - self.sampled_ns).max(0.0)
     }

@@ -1,7 +1,7 @@
 //! How far boxes move in a frame: looked at now and then.
 //!
-//! Where boxes speed up, what an incremental algorithm was predicted to cost changes by factors within a few dozen frames, and a prediction for the pace of
-//! before would be taken for a machine that is slower.
+//! Where boxes speed up, what an incremental algorithm was predicted to cost changes by factors within a few dozen
+//! frames, and a prediction for the pace of before would be taken for a machine that is slower.
 
 use crate::aabb::Aabb;
 use crate::clock::Instant;
@@ -44,8 +44,8 @@ impl MotionWatch {
         self.moved
     }
 
-    /// Compares the boxes of a frame with those of the frame before, which are [remembered](Self::ran). Whether they move at another pace than when this was
-    /// looked at last.
+    /// Compares the boxes of a frame with those of the frame before, which are [remembered](Self::ran). Whether they
+    /// move at another pace than when this was looked at last.
     pub(super) fn look(&mut self, boxes: &[Aabb]) -> bool {
         let started = Instant::now();
         let moved = self.displacement.moved(boxes);
@@ -75,9 +75,11 @@ impl MotionWatch {
         }
     }
 
-    /// Remembers the boxes of a frame that was decided on and has run, where that is due or pays. Whether the next frame is to be [looked at](Self::look) for that.
+    /// Remembers the boxes of a frame that was decided on and has run, where that is due or pays. Whether the next
+    /// frame is to be [looked at](Self::look) for that.
     pub(super) fn ran(&mut self, boxes: &[Aabb]) -> bool {
-        // Not when it is decided: a frame may be decided on twice before it runs, and the boxes have not moved in between.
+        // Not when it is decided: a frame may be decided on twice before it runs, and the boxes have not moved in
+        // between.
         let due = self.state == State::Due || self.pays();
         if due {
             self.watch(boxes);

@@ -1,16 +1,19 @@
 //! Frames between two decisions: what they tell is added up, and taken in by the next decision.
 //!
-//! What is believed of costs lies in no cache when a frame of a program begins. A frame that only adds to a few sums leaves it there.
+//! What is believed of costs lies in no cache when a frame of a program begins. A frame that only adds to a few sums
+//! leaves it there.
 
 use crate::broad_phase::{FrameKind, FrameWork};
 
-/// Two looks at a clock, in nanoseconds, in code that lies in no cache, and the share of the frames' time that they may take.
+/// Two looks at a clock, in nanoseconds, in code that lies in no cache, and the share of the frames' time that they
+/// may take.
 const CLOCK_NS: f64 = 100.0;
 const SHARE: f64 = 0.0025;
 /// One frame in so many is timed at least.
 const MOST_APART: f64 = 32.0;
 
-/// After so many timed frames, and this share of the time until the next decision, they call for one where their mean is off by this factor.
+/// After so many timed frames, and this share of the time until the next decision, they call for one where their mean
+/// is off by this factor.
 const ENOUGH: u32 = 8;
 const EARLIEST: f64 = 0.25;
 const OFF: f64 = 1.2;
@@ -32,7 +35,8 @@ pub(super) struct Budget {
     /// What a frame of the mean work takes otherwise, and what is left, in nanoseconds.
     pub(super) now_ns: f64,
     pub(super) left_ns: f64,
-    /// It goes on with what the one that is settled on keeps: what is made again in a frame would have been made again by either.
+    /// It goes on with what the one that is settled on keeps: what is made again in a frame would have been made
+    /// again by either.
     pub(super) shares: bool,
 }
 
@@ -83,15 +87,17 @@ impl Passed {
         }
     }
 
-    /// Whether they have cost more than a trial may. Looked at here after each frame: decisions every few frames would cost more than the trial.
+    /// Whether they have cost more than a trial may. Looked at here after each frame: decisions every few frames
+    /// would cost more than the trial.
     pub(super) fn is_over_budget(&self) -> bool {
         let Some(Budget { now_ns, left_ns, shares }) = self.usual.trial else { return false };
         let work = if shares { self.over_mean } else { f64::from(self.timed) };
         self.ns - work * now_ns > left_ns
     }
 
-    /// Whether the times differ so much from what was expected that the decision may have to be another, where the next one was to be so many
-    /// nanoseconds away. In time, for that is what is lost: frames that are ten times as long as expected are looked at ten times as soon.
+    /// Whether the times differ so much from what was expected that the decision may have to be another, where the
+    /// next one was to be so many nanoseconds away. In time, for that is what is lost: frames that are ten times as
+    /// long as expected are looked at ten times as soon.
     pub(super) fn is_off(&self, rest_ns: f64) -> bool {
         let passed_ns = self.mean_ns().unwrap_or_default() * f64::from(self.frames);
         if self.timed < ENOUGH || passed_ns < EARLIEST * rest_ns {

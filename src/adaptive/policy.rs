@@ -18,12 +18,12 @@ const STEP_SLACK: f64 = 0.05;
 /// A switch that is expected to save its price within so many frames is made at once.
 const SOON: f64 = 4.0;
 
-/// An algorithm that is expected to cost so many times as much is not tried: beliefs are seldom off by that, and to ask how likely it is takes longer
-/// than the rest of a decision.
+/// An algorithm that is expected to cost so many times as much is not tried: beliefs are seldom off by that, and to
+/// ask how likely it is takes longer than the rest of a decision.
 const HOPELESS: f64 = 4.0;
 
-/// A frame waits for other programs no longer than this many times what it takes at most, as far as that counts: a breakpoint or a page
-/// from disk tells nothing of the frames that follow.
+/// A frame waits for other programs no longer than this many times what it takes at most, as far as that counts: a
+/// breakpoint or a page from disk tells nothing of the frames that follow.
 const MOST_WAIT: f64 = 64.0;
 
 /// Chooses, and learns from what the choices cost.
@@ -47,8 +47,9 @@ pub(super) struct Policy {
     batch: FrameBatch,
     /// What each candidate would have saved since it became cheaper than the one that runs.
     saved_ns: Vec<f64>,
-    /// Frames until the next decision at most: where a switch waits until it would have saved its price, until then, and as many at least as lose what a
-    /// decision takes; where what would be cheapest is sheltered from, until it may run again.
+    /// Frames until the next decision at most: where a switch waits until it would have saved its price, until then,
+    /// and as many at least as lose what a decision takes; where what would be cheapest is sheltered from, until it
+    /// may run again.
     rests_at_most: Option<f64>,
     /// The number of the frame that is to run, and of the one that was decided last.
     frame: u64,
@@ -61,8 +62,8 @@ pub(super) struct Policy {
 }
 
 impl Policy {
-    /// `kept` says for each candidate where it finds what the frame before left, if a frame is cheaper for it after one that was alike: one
-    /// number for all that share it.
+    /// `kept` says for each candidate where it finds what the frame before left, if a frame is cheaper for it after
+    /// one that was alike: one number for all that share it.
     pub(super) fn new(tuning: Tuning, kept: &[Option<usize>], usable: Vec<bool>) -> Self {
         let count = usable.len();
         let learner = (!tuning.costs.is_empty()).then(|| Learner::new(&tuning.costs, kept));
@@ -221,8 +222,9 @@ impl Policy {
 
     /// Whether to go on with the one that runs, or to which one to switch.
     ///
-    /// A switch is made once the frames since the other became cheaper would have saved what it costs. Where costs hold still that
-    /// loses at most twice what knowing the future would, and where they flicker about a border nothing is ever saved for long.
+    /// A switch is made once the frames since the other became cheaper would have saved what it costs. Where costs
+    /// hold still that loses at most twice what knowing the future would, and where they flicker about a border
+    /// nothing is ever saved for long.
     fn settle(&mut self, settled: usize, best: usize, frames: f64) -> (usize, Reason) {
         let now = self.estimates.mean_ns[settled];
         for (saved, mean_ns) in self.saved_ns.iter_mut().zip(&self.estimates.mean_ns) {
@@ -243,14 +245,15 @@ impl Policy {
         if let Some(k) = self.cheapest(pays) {
             return (k, Reason::Switched);
         }
-        // A decision that comes later than the switch has paid loses the gain of each frame in between. One that comes sooner costs no more than the frames before it
-        // lose by waiting.
+        // A decision that comes later than the switch has paid loses the gain of each frame in between. One that
+        // comes sooner costs no more than the frames before it lose by waiting.
         let left_ns = (price_ns(best) - self.saved_ns[best]).max(self.decision_ns);
         self.rests_at_most = Some(left_ns / (now - self.estimates.mean_ns[best])).filter(|frames| *frames > 0.0);
         (settled, Reason::Hysteresis)
     }
 
-    /// Frames until the next decision, at most, where a switch waits until it has saved its price or until a shelter ends.
+    /// Frames until the next decision, at most, where a switch waits until it has saved its price or until a shelter
+    /// ends.
     pub(super) fn rests_at_most(&self) -> Option<f64> {
         self.rests_at_most
     }
@@ -332,8 +335,9 @@ impl Policy {
         self.observe_full(candidate);
     }
 
-    /// Takes in that a candidate ran the frame that was decided, what that took and how it came about; `None` where it builds on no frame
-    /// before. Whether that was so much that the next frame is to be decided on, whatever it was before.
+    /// Takes in that a candidate ran the frame that was decided, what that took and how it came about; `None` where
+    /// it builds on no frame before. Whether that was so much that the next frame is to be decided on, whatever it
+    /// was before.
     pub(super) fn ran(&mut self, candidate: usize, ns: f64, work: Option<FrameWork>) -> bool {
         let entered = self.ran.replace(candidate) != Some(candidate);
         let rebuilt = work.is_some_and(|work| work.kind == FrameKind::Rebuilt);
@@ -376,7 +380,8 @@ impl Policy {
         self.observe_full(candidate);
     }
 
-    /// Pays for frames of a trial, or the first one after it: what so many took of a candidate, with so much work in frames of its mean one.
+    /// Pays for frames of a trial, or the first one after it: what so many took of a candidate, with so much work in
+    /// frames of its mean one.
     fn pay_for_trial(&mut self, candidate: usize, ns: f64, over_mean: f64, frames: u32, first: bool) {
         let Some(settled) = self.settled else { return };
         // What is made again in a frame would have been made again in any other way.
@@ -406,7 +411,8 @@ impl Policy {
         }
     }
 
-    /// Takes in what the decision for the frame that ran took, where that is known, and what decisions take in the mean.
+    /// Takes in what the decision for the frame that ran took, where that is known, and what decisions take in the
+    /// mean.
     pub(super) fn decision_took(&mut self, ns: Option<f64>, mean_ns: f64) {
         self.decision_ns = mean_ns;
         if self.tried {

@@ -27,11 +27,13 @@ enum Decided {
 }
 
 /// The algorithms, the choice among them, and what is known of the frames.
-// A frame without a decision looks at what stands first and at the beginning of `tracker`, and at nothing else: between two frames of a program all of it
-// leaves the caches, and ten lines of memory here and there take as long as some frames.
+// A frame without a decision looks at what stands first and at the beginning of `tracker`, and at nothing else:
+// between two frames of a program all of it leaves the caches, and ten lines of memory here and there take as long as
+// some frames.
 #[repr(C, align(64))]
 pub(super) struct Runner {
-    /// The throttle alone tells whether the next frame needs a decision, and the instance that goes on where it needs none.
+    /// The throttle alone tells whether the next frame needs a decision, and the instance that goes on where it needs
+    /// none.
     steady: bool,
     /// Another tuning may arrive before any frame.
     awaits: bool,
@@ -306,7 +308,8 @@ impl Runner {
             };
             let candidate = &self.candidates[choice.chosen];
             let Some(instance) = candidate.instance else {
-                // Choosing leaves out what failed. Were it to come here all the same, no answer is better than an old one.
+                // Choosing leaves out what failed. Were it to come here all the same, no answer is better than an old
+                // one.
                 return Err(self.gone());
             };
             let frame = self.policy.frame();
@@ -350,8 +353,9 @@ impl Runner {
         if let Some(frames) = trial.map(f64::from).or(self.policy.rests_at_most()) {
             self.tracker.rest_no_longer_than(frames);
         }
-        // What began before it was known how far boxes move is decided on, and gets a plan of its frame, once more before it may rest. Without, `pair-cache` in
-        // `uniform` of 800 took 1.19 times the best single algorithm (n 8) in place of 1.05 (n 12). So is what takes the place of one that failed.
+        // What began before it was known how far boxes move is decided on, and gets a plan of its frame, once more
+        // before it may rest. Without, `pair-cache` in `uniform` of 800 took 1.19 times the best single algorithm (n
+        // 8) in place of 1.05 (n 12). So is what takes the place of one that failed.
         let again = began && (choice.reason == Reason::FellBack || trial.is_none() && self.tracker.moved().is_none());
         if dear || again || stood_out {
             self.tracker.wake();

@@ -1,16 +1,18 @@
-//! What is left for some frames when one costs far more than was expected, and more than the tree would, whose cost follows the numbers of boxes and pairs
-//! alone: the cheapest of the other methods runs, most often the tree.
+//! What is left for some frames when one costs far more than was expected, and more than the tree would, whose cost
+//! follows the numbers of boxes and pairs alone: the cheapest of the other methods runs, most often the tree.
 
 use crate::algorithm::AlgorithmId;
 
-/// The name of a method that is cheap enough wherever the boxes lie. Where a tuning has no cost of one, there is no shelter.
+/// The name of a method that is cheap enough wherever the boxes lie. Where a tuning has no cost of one, there is no
+/// shelter.
 const METHOD: &str = "bvh";
 
-/// A frame is dear that costs this many times what was expected of it, and as many times what the shelter is expected to cost.
+/// A frame is dear that costs this many times what was expected of it, and as many times what the shelter is expected
+/// to cost.
 const DEAR: f64 = 3.0;
 
-/// Frames for which a method is not run after its dear frame, and by how much and up to what that grows with each further one. Another
-/// program on a core makes one frame dear: it costs one frame in the shelter.
+/// Frames for which a method is not run after its dear frame, and by how much and up to what that grows with each
+/// further one. Another program on a core makes one frame dear: it costs one frame in the shelter.
 const PAUSE: u32 = 1;
 const GROWTH: u32 = 4;
 const MOST_PAUSE: u32 = 1024;
@@ -21,7 +23,8 @@ const FORGIVEN: u64 = 64;
 /// Which methods are not run for now.
 #[derive(Debug, Clone)]
 pub(super) struct Shelter {
-    /// Of each candidate the number of its method, on whatever processor and number of threads: they share what makes a frame dear.
+    /// Of each candidate the number of its method, on whatever processor and number of threads: they share what makes
+    /// a frame dear.
     methods: Vec<usize>,
     /// Of each candidate whether it is a shelter.
     shelters: Vec<bool>,
@@ -66,8 +69,8 @@ impl Shelter {
         self.pauses[self.methods[candidate]].until.saturating_sub(frame)
     }
 
-    /// Takes in that a candidate ran a frame of which `expected_ns` was expected, while a shelter would have taken `shelter_ns`. Whether the
-    /// next frame is not to be spent on it.
+    /// Takes in that a candidate ran a frame of which `expected_ns` was expected, while a shelter would have taken
+    /// `shelter_ns`. Whether the next frame is not to be spent on it.
     pub(super) fn ran(&mut self, candidate: usize, frame: u64, ns: f64, expected_ns: f64, shelter_ns: f64) -> bool {
         let pause = &mut self.pauses[self.methods[candidate]];
         let dear = !self.shelters[candidate] && ns > DEAR * expected_ns.max(shelter_ns);

@@ -1,13 +1,15 @@
-//! What a switch costs: a frame in which an algorithm has nothing to build upon, its first one or one in which it makes again what it keeps.
+//! What a switch costs: a frame in which an algorithm has nothing to build upon, its first one or one in which it
+//! makes again what it keeps.
 
 use crate::broad_phase::{FrameKind, FrameWork};
 
-/// Share of a frame that the first one costs beside: memory that is no longer in a cache, threads that sleep. Learned from then on.
+/// Share of a frame that the first one costs beside: memory that is no longer in a cache, threads that sleep. Learned
+/// from then on.
 const COLD: f64 = 0.15;
-/// A frame made again by an incremental algorithm, over a frame of the other way that its cost curve knows, or over a frame of its own
-/// where there is no other way. `pair-cache` over `bvh`, its other way: medians 1.6 to 1.9, quartiles 1.4 to 3.0, in four reports of the two
-/// hosts of `datasets/` (frames over 2.5 times the median of their timing, where these are less than a fifth of its frames). Rather more: a
-/// first frame is colder than these.
+/// A frame made again by an incremental algorithm, over a frame of the other way that its cost curve knows, or over a
+/// frame of its own where there is no other way. `pair-cache` over `bvh`, its other way: medians 1.6 to 1.9,
+/// quartiles 1.4 to 3.0, in four reports of the two hosts of `datasets/` (frames over 2.5 times the median of their
+/// timing, where these are less than a fifth of its frames). Rather more: a first frame is colder than these.
 const FROM_NOTHING: f64 = 2.0;
 
 /// Frames of absence after which what an algorithm kept is worth nothing any more.
@@ -17,11 +19,13 @@ const FORGOTTEN: u64 = 3;
 const SHARE: f64 = 0.25;
 const MOST: f64 = 4.0;
 
-/// Share of the frames that are made again: cost curves come from medians, which leave those frames out. Of what is seen that counts which is beyond the second: a
-/// few frames more or less of these are in what is believed of keeping, and to count all that are seen costs 0.5 to 1.0 % in replayed traces.
+/// Share of the frames that are made again: cost curves come from medians, which leave those frames out. Of what is
+/// seen that counts which is beyond the second: a few frames more or less of these are in what is believed of
+/// keeping, and to count all that are seen costs 0.5 to 1.0 % in replayed traces.
 const REBUILDS: f64 = 0.02;
 const MANY_REBUILDS: f64 = 0.15;
-/// Frames over which the share that is seen is the mean, and frames after which half of it is forgotten where none of these run.
+/// Frames over which the share that is seen is the mean, and frames after which half of it is forgotten where none of
+/// these run.
 const REBUILDS_OVER: f64 = 100.0;
 const REBUILDS_LAST: f64 = 1000.0;
 
@@ -50,7 +54,8 @@ struct KeptWork {
 
 #[derive(Debug, Clone)]
 struct SwitchingCost {
-    /// Where it finds what the frame before left: a position in `SwitchingCosts::works`. `None` where every frame is made from scratch.
+    /// Where it finds what the frame before left: a position in `SwitchingCosts::works`. `None` where every frame is
+    /// made from scratch.
     kept: Option<usize>,
     /// A frame with nothing to build upon over one of the other way.
     over: f64,
@@ -61,7 +66,8 @@ struct SwitchingCost {
 pub(super) struct Expected {
     /// The mean over its frames.
     pub(super) mean_ns: f64,
-    /// A frame without the help of the frame before, as the other way of its curve has it; the same where there is one way only.
+    /// A frame without the help of the frame before, as the other way of its curve has it; the same where there is
+    /// one way only.
     pub(super) alone_ns: f64,
 }
 
@@ -76,7 +82,8 @@ impl SwitchingCosts {
         Self { costs: kept.iter().map(cost).collect(), works: vec![work; works(kept)] }
     }
 
-    /// Other instances keep, shared by the same candidates as before, nothing yet. False where other candidates share it.
+    /// Other instances keep, shared by the same candidates as before, nothing yet. False where other candidates share
+    /// it.
     pub(super) fn remade(&mut self, kept: &[Option<usize>]) -> bool {
         self.works.iter_mut().for_each(|work| work.last = None);
         self.costs.iter().map(|p| p.kept).eq(kept.iter().copied())
@@ -92,7 +99,8 @@ impl SwitchingCosts {
         self.keeps(candidate) && self.costs[candidate].kept == self.costs[other].kept
     }
 
-    /// What a frame of a candidate takes in the mean, where its cost curve says so much of it and of the other way of it.
+    /// What a frame of a candidate takes in the mean, where its cost curve says so much of it and of the other way of
+    /// it.
     pub(super) fn mean_ns(&self, candidate: usize, frame: u64, built_ns: f64, alone_ns: f64) -> f64 {
         let Some(kept) = self.costs[candidate].kept else { return built_ns };
         let rebuilds = (self.works[kept].rebuilds_at(frame) - MANY_REBUILDS).max(REBUILDS);
@@ -108,7 +116,8 @@ impl SwitchingCosts {
         }
     }
 
-    /// What is lost where a candidate is left for one that does not go on with what it keeps: to make that again later costs so much more.
+    /// What is lost where a candidate is left for one that does not go on with what it keeps: to make that again
+    /// later costs so much more.
     pub(super) fn leave_ns(&self, left: usize, other: usize, frame: u64, expected: Expected) -> f64 {
         if !self.remembers(left, frame) || self.share(left, other) {
             return 0.0;
@@ -121,7 +130,8 @@ impl SwitchingCosts {
         (self.costs[candidate].over * expected.alone_ns).max(expected.mean_ns)
     }
 
-    /// Takes in that a candidate ran so many frames up to this one, in how many of them all was made again, and how the last one came about.
+    /// Takes in that a candidate ran so many frames up to this one, in how many of them all was made again, and how
+    /// the last one came about.
     pub(super) fn ran(&mut self, candidate: usize, frame: u64, frames: u32, rebuilt: u32, work: Option<FrameWork>) {
         let Some(kept) = self.costs[candidate].kept else { return };
         let first = frame + 1 - u64::from(frames);

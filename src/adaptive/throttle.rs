@@ -1,11 +1,13 @@
 //! How often to decide: in short frames not in each of them, unless their number of objects changes.
 
-/// Share of the frames' time that decisions and their clock may take, but for those for which a switch waits to be paid.
+/// Share of the frames' time that decisions and their clock may take, but for those for which a switch waits to be
+/// paid.
 const SHARE: f64 = 0.004;
 /// Share of a decision in the mean, and how many times the mean it counts at most.
 const MEAN: f64 = 1.0 / 8.0;
 const MOST_RISE: f64 = 4.0;
-/// Frames between two decisions, at most. A frame that stands out, frames that are off and numbers that jump call for one all the same.
+/// Frames between two decisions, at most. A frame that stands out, frames that are off and numbers that jump call for
+/// one all the same.
 const MOST_FRAMES: f64 = 1024.0;
 
 /// By how much such a share rises with the [`drift`] of the number of objects since the last decision.
@@ -89,8 +91,8 @@ impl DecisionThrottle {
     /// What the decision took, where that is known, and its frame.
     pub(super) fn took(&mut self, decision_ns: Option<f64>, frame_ns: f64) {
         if let Some(ns) = decision_ns {
-            // The mean of late, for that is what is paid: between two frames a program needs the caches for itself, and a decision waits for memory
-            // then. One that was interrupted counts for little.
+            // The mean of late, for that is what is paid: between two frames a program needs the caches for itself,
+            // and a decision waits for memory then. One that was interrupted counts for little.
             let before = if self.decision_ns > 0.0 { self.decision_ns } else { ns };
             self.decision_ns = before + MEAN * (ns.min(MOST_RISE * before) - before);
         }

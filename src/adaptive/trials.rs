@@ -7,28 +7,33 @@ pub(super) const HORIZON: f64 = 300.0;
 
 /// Share of the time of all frames that trials may cost.
 const SHARE: f64 = 0.005;
-/// Frames' worth of that which is there at the start: one frame in which an incremental algorithm begins costs two or three.
+/// Frames' worth of that which is there at the start: one frame in which an incremental algorithm begins costs two or
+/// three.
 const AT_FIRST: f64 = 4.0;
-/// Where the objects are suddenly so many times the most so far, a level that loads, the difference is a start of its own: without it a level of 3000 boxes took
-/// 1.38 times the best single algorithm (n 8) in place of 1.09 (n 4). A scene that grows slowly brings along what it has learned.
+/// Where the objects are suddenly so many times the most so far, a level that loads, the difference is a start of its
+/// own: without it a level of 3000 boxes took 1.38 times the best single algorithm (n 8) in place of 1.09 (n 4). A
+/// scene that grows slowly brings along what it has learned.
 const SUDDENLY: f64 = 1.25;
 /// No more frames' worth than these are saved up: else a long rest would be followed by one trial after the other.
 const MOST: f64 = 12.0;
-/// A trial that is expected to save so many times its price beside that is made on credit, up to so many frames' worth. In 80 runs of 20 scenes such trials would have
-/// saved as much as they were expected to, a fifth of the frames, and were the most that was lost; half as many times costs 0.9 % more in replayed runs:
+/// A trial that is expected to save so many times its price beside that is made on credit, up to so many frames'
+/// worth. In 80 runs of 20 scenes such trials would have saved as much as they were expected to, a fifth of the
+/// frames, and were the most that was lost; half as many times costs 0.9 % more in replayed runs:
 /// docs/methodology.md.
 const ON_CREDIT: f64 = 16.0;
 const MOST_DEBT: f64 = 8.0;
 /// Frames between the end of a trial and the beginning of the next, at least.
 const APART: u64 = 20;
-/// Frames after which it is looked again whether a trial pays, where none did: to look takes longer than the rest of a decision.
+/// Frames after which it is looked again whether a trial pays, where none did: to look takes longer than the rest of
+/// a decision.
 const LOOK_AGAIN: u64 = 8;
 
-/// Frames of a trial of an algorithm that keeps work from frame to frame, at most: its first one makes that, the others show what it saves, and `pair-cache`
-/// finds the size of its margin in a hundred. Where it costs no more than the one that runs, they cost nothing. One that goes on with what the one that
-/// runs keeps is that with another number of threads, which shows slowly: its first frame wakes them and takes 1.6 times as long as in another instance (median
-/// of 413; 2.4 in the mean), and later ones differ among themselves by more than the two numbers do. Any other algorithm shows what it costs in its second
-/// frame; the first one is cold.
+/// Frames of a trial of an algorithm that keeps work from frame to frame, at most: its first one makes that, the
+/// others show what it saves, and `pair-cache` finds the size of its margin in a hundred. Where it costs no more than
+/// the one that runs, they cost nothing. One that goes on with what the one that runs keeps is that with another
+/// number of threads, which shows slowly: its first frame wakes them and takes 1.6 times as long as in another
+/// instance (median of 413; 2.4 in the mean), and later ones differ among themselves by more than the two numbers do.
+/// Any other algorithm shows what it costs in its second frame; the first one is cold.
 pub(super) const OF_KEPT: u32 = 128;
 pub(super) const OF_SHARED: u32 = 8;
 pub(super) const OF_OTHERS: u32 = 2;
@@ -88,8 +93,8 @@ pub(super) struct Offer {
 }
 
 impl Offer {
-    /// Of so many frames of a candidate, of which one is expected to take `mean_ns` and the first one `switch_ns` more, where one takes `now_ns`.
-    /// A decision takes `decision_ns`.
+    /// Of so many frames of a candidate, of which one is expected to take `mean_ns` and the first one `switch_ns`
+    /// more, where one takes `now_ns`. A decision takes `decision_ns`.
     pub(super) fn of(
         candidate: usize,
         frames: u32,
@@ -129,7 +134,8 @@ impl Trials {
         self.allowance_ns = (self.allowance_ns + AT_FIRST * dearer_ns + SHARE * now_ns * frames).min(MOST * now_ns);
     }
 
-    /// What a trial may cost that begins with this frame, where frames take `now_ns`; `None` where none may begin. The next look is some frames later.
+    /// What a trial may cost that begins with this frame, where frames take `now_ns`; `None` where none may begin.
+    /// The next look is some frames later.
     pub(super) fn allowance(&mut self, frame: u64, now_ns: f64) -> Option<Allowance> {
         if self.running.is_some() || frame < self.not_before {
             return None;
@@ -144,8 +150,9 @@ impl Trials {
         self.running = Some(Trial { candidate, left: frames, left_ns: ENOUGH * now_ns });
     }
 
-    /// Takes in what a decision, or a frame of a trial, its `first` or another, or the first one after it has cost beside what frames cost otherwise.
-    /// What decisions and first frames cost can't be saved any more, and ends no trial.
+    /// Takes in what a decision, or a frame of a trial, its `first` or another, or the first one after it has cost
+    /// beside what frames cost otherwise. What decisions and first frames cost can't be saved any more, and ends no
+    /// trial.
     pub(super) fn pay(&mut self, ns: f64, first: bool) {
         self.allowance_ns -= ns;
         if let Some(trial) = self.running.as_mut().filter(|_| !first) {
@@ -160,7 +167,8 @@ impl Trials {
         }
     }
 
-    /// Frames from the last one of a trial, that one counted, until its end, and what they may cost beside what frames cost otherwise, in nanoseconds.
+    /// Frames from the last one of a trial, that one counted, until its end, and what they may cost beside what
+    /// frames cost otherwise, in nanoseconds.
     pub(super) fn rest(&self) -> Option<(u32, f64)> {
         self.running.map(|t| (t.left + 1, t.left_ns))
     }
@@ -178,8 +186,8 @@ impl Trials {
     }
 }
 
-/// Expected saving, as a share of the present cost, of knowing what another costs: the mean over a normal distribution of the logarithm
-/// `ln_ratio` of other over present cost, of what is below nought.
+/// Expected saving, as a share of the present cost, of knowing what another costs: the mean over a normal
+/// distribution of the logarithm `ln_ratio` of other over present cost, of what is below nought.
 pub(super) fn expected_gain(ln_ratio: f64, deviation: f64) -> f64 {
     if deviation <= 0.0 {
         return 0.0;
@@ -189,8 +197,9 @@ pub(super) fn expected_gain(ln_ratio: f64, deviation: f64) -> f64 {
     (deviation * (normal_density(u) + u * cumulative(u)) - (-ln_ratio).max(0.0)).max(0.0)
 }
 
-/// The cumulative distribution of the standard normal one, to 1e-2: the logistic curve that comes closest. With it nothing is to be gained from what is
-/// expected to cost over 1.8 deviations more, where the exact curve has a hundredth of a deviation and less: what is that far off is not tried.
+/// The cumulative distribution of the standard normal one, to 1e-2: the logistic curve that comes closest. With it
+/// nothing is to be gained from what is expected to cost over 1.8 deviations more, where the exact curve has a
+/// hundredth of a deviation and less: what is that far off is not tried.
 fn cumulative(x: f64) -> f64 {
     1.0 / (1.0 + (-1.702 * x).exp())
 }

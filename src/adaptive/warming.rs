@@ -6,8 +6,8 @@ use std::sync::mpsc;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// How long who ends waits for an algorithm that is getting ready: a driver may hold it longer, up to the limit of its GPU. The thread then ends by itself,
-/// and what it holds with it.
+/// How long who ends waits for an algorithm that is getting ready: a driver may hold it longer, up to the limit of
+/// its GPU. The thread then ends by itself, and what it holds with it.
 const LAST_WAIT: Duration = Duration::from_secs(2);
 
 /// Where an algorithm is.
@@ -33,7 +33,8 @@ impl Place {
         }
     }
 
-    /// Sends the algorithm away to get ready for that many objects. Where there are no threads it stays as it is, and its first frame pays.
+    /// Sends the algorithm away to get ready for that many objects. Where there are no threads it stays as it is, and
+    /// its first frame pays.
     pub(super) fn send(&mut self, objects: usize) {
         let (hand_over, taken) = mpsc::channel::<Box<dyn BroadPhase>>();
         let run = move || {

@@ -2,8 +2,8 @@
 
 /// How several threads change the cost of work on one.
 ///
-/// The caller begins while its helpers wake. A helper that wakes too late finds nothing left: the frame then takes the time of one
-/// thread, plus the time to call the helpers.
+/// The caller begins while its helpers wake. A helper that wakes too late finds nothing left: the frame then takes
+/// the time of one thread, plus the time to call the helpers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]

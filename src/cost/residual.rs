@@ -1,24 +1,24 @@
 //! What the terms of a cost leave unexplained, as a function of the load.
 //!
-//! A Gaussian process with inducing points (Quiñonero-Candela and Rasmussen, A unifying view of sparse approximate Gaussian process
-//! regression, 2005): a weighted sum of the load's similarity to each of some places. Far from all places it is zero, and the terms
-//! alone hold.
+//! A Gaussian process with inducing points (Quiñonero-Candela and Rasmussen, A unifying view of sparse approximate
+//! Gaussian process regression, 2005): a weighted sum of the load's similarity to each of some places. Far from all
+//! places it is zero, and the terms alone hold.
 
 use crate::algorithm::Load;
 use std::sync::Arc;
 
 /// Coordinates of a load. The last one counts only for algorithms that are cheaper if boxes move little.
 const COORDINATES: usize = 5;
-/// Length scale of each coordinate: the distance over which a residual keeps its height. The coordinates are base-2 logarithms of
-/// objects, and of pairs, strip candidates and axis candidates an object, and [`Load::moved`]. Halving or doubling a length changes
-/// regrets by less than two fits of the same reports differ.
+/// Length scale of each coordinate: the distance over which a residual keeps its height. The coordinates are base-2
+/// logarithms of objects, and of pairs, strip candidates and axis candidates an object, and [`Load::moved`]. Halving
+/// or doubling a length changes regrets by less than two fits of the same reports differ.
 const LENGTHS: [f64; COORDINATES] = [3.0, 3.0, 4.0, 6.0, 0.375];
 /// Pairs an object below which scenes count as alike.
 const FEW_PAIRS: f64 = 0.05;
 /// Highest plausible weight or constant. Weights of similar places may be large with opposite signs.
 const MOST_LN: f64 = 1000.0;
-/// Base-2 logarithm of the exponent of the kernel, a rational quadratic: regrets equal those of a squared exponential, and it takes a
-/// division and four products instead of an exponential.
+/// Base-2 logarithm of the exponent of the kernel, a rational quadratic: regrets equal those of a squared
+/// exponential, and it takes a division and four products instead of an exponential.
 const EXPONENT_LOG2: u32 = 4;
 
 /// Loads at which the residuals of all methods of a machine or a model are known.
@@ -59,7 +59,8 @@ pub(crate) struct Likeness {
 }
 
 impl Places {
-    /// Most places of a residual. 96 improved no choice on held-out machines, and each place costs time in every decision.
+    /// Most places of a residual. 96 improved no choice on held-out machines, and each place costs time in every
+    /// decision.
     pub const MOST: usize = 64;
 
     /// Creates places at the first [`Places::MOST`] of these loads.
@@ -93,8 +94,8 @@ impl Places {
         &self.loads
     }
 
-    /// Returns the similarity of `load` to each place, 0 to 1, which is the correlation of two values of a residual. With `by_motion` it
-    /// depends on how far boxes move too.
+    /// Returns the similarity of `load` to each place, 0 to 1, which is the correlation of two values of a residual.
+    /// With `by_motion` it depends on how far boxes move too.
     #[must_use]
     pub fn likeness(&self, load: &Load, by_motion: bool) -> Vec<f64> {
         let likeness = self.likeness_of(load);

@@ -1,14 +1,18 @@
-//! What is believed of the costs on a machine: a prediction, and how far from it each algorithm lies as far as timings told.
+//! What is believed of the costs on a machine: a prediction, and how far from it each algorithm lies as far as
+//! timings told.
 //!
-//! The natural logarithm of real over predicted time is taken to be a sum of parts. Some are shared: by a class of processor (a clock that
-//! throttles, tuning of another machine), by a number of threads or GPUs, on all of a frame and on what calling them takes (cores that moved apart, a core
-//! that is taken), by incremental algorithms that keep the same from frame to frame, and by the algorithms of a method. One is the
-//! algorithm's own: a constant and a function of the load, a Gaussian process at the first of the places of the residuals. A Kalman filter follows all of
-//! them: the shared ones with all their covariances, those of an algorithm by themselves. That leaves out what observations tell of the difference between a
-//! shared part and an own one, so that a sum of both is believed to be less sure than it is.
+//! The natural logarithm of real over predicted time is taken to be a sum of parts. Some are shared: by a class of
+//! processor (a clock that throttles, tuning of another machine), by a number of threads or GPUs, on all of a frame
+//! and on what calling them takes (cores that moved apart, a core that is taken), by incremental algorithms that keep
+//! the same from frame to frame, and by the algorithms of a method. One is the algorithm's own: a constant and a
+//! function of the load, a Gaussian process at the first of the places of the residuals. A Kalman filter follows all
+//! of them: the shared ones with all their covariances, those of an algorithm by themselves. That leaves out what
+//! observations tell of the difference between a shared part and an own one, so that a sum of both is believed to be
+//! less sure than it is.
 //!
-//! A frame that decides goes through all covariances, and between two frames of a program these lie in no cache. So methods have no function of the load for
-//! all of their algorithms: in 88 replayed runs it changed costs by 0.0 +- 0.4 %, and made the covariances of the shared parts thirty times as large.
+//! A frame that decides goes through all covariances, and between two frames of a program these lie in no cache. So
+//! methods have no function of the load for all of their algorithms: in 88 replayed runs it changed costs by 0.0 +-
+//! 0.4 %, and made the covariances of the shared parts thirty times as large.
 
 mod basis;
 mod own;
@@ -25,21 +29,23 @@ use std::sync::Arc;
 pub(crate) use basis::View;
 pub(crate) use part::Deviations;
 
-/// Functions of the load that a part consists of beside its constant. More places tell a little more of scenes that were measured and a little less of
-/// others.
+/// Functions of the load that a part consists of beside its constant. More places tell a little more of scenes that
+/// were measured and a little less of others.
 pub(crate) const CURVE: usize = 8;
 /// A constant and these.
 const SIZE: usize = CURVE + 1;
 
-/// So many frames are forgotten at once: that goes through all covariances, which between two frames of a program lie in no cache.
+/// So many frames are forgotten at once: that goes through all covariances, which between two frames of a program lie
+/// in no cache.
 const FEWEST_FRAMES: f64 = 16.0;
 
-/// Where boxes move e times as far as before, or an e-th of that, an e-th stays of what was observed of keeping. Less than the
-/// second is the noise of [`Displacement`](crate::algorithm::Displacement), which watches few boxes.
+/// Where boxes move e times as far as before, or an e-th of that, an e-th stays of what was observed of keeping. Less
+/// than the second is the noise of [`Displacement`](crate::algorithm::Displacement), which watches few boxes.
 const PACE_LN: f64 = 1.0;
 const SAME_PACE_LN: f64 = 0.5;
 
-/// No more than this many standard deviations of a surprise are believed at once: frames whose threads waited for a core take fifty times as long.
+/// No more than this many standard deviations of a surprise are believed at once: frames whose threads waited for a
+/// core take fifty times as long.
 pub(crate) const MOST_SURPRISE: f64 = 3.0;
 
 /// What is believed of the algorithms of a tuning. Memory is allocated when it is made.
@@ -48,12 +54,14 @@ pub(crate) struct Belief {
     basis: Basis,
     algorithms: Vec<Parts>,
     own: Vec<Own>,
-    /// The shared parts: means, covariance row by row, the variances once what was observed is forgotten, and frames after which each counts for half.
+    /// The shared parts: means, covariance row by row, the variances once what was observed is forgotten, and frames
+    /// after which each counts for half.
     mean: Vec<f64>,
     covariance: Vec<f64>,
     later: Vec<f64>,
     lasts: Vec<f64>,
-    /// Of the observation at hand: covariance of each shared part with it, and of each entry of the own part. `fading` is room for a passage of time.
+    /// Of the observation at hand: covariance of each shared part with it, and of each entry of the own part.
+    /// `fading` is room for a passage of time.
     with: Vec<f64>,
     own_with: [f64; SIZE],
     fading: Vec<f64>,
@@ -76,15 +84,16 @@ struct Parts {
 const SHARED: usize = 5;
 type Slopes = [(usize, f64); SHARED];
 
-/// An algorithm that runs, as what is believed of others is held against it: how the logarithm of its cost hangs on shared parts, and its variance.
+/// An algorithm that runs, as what is believed of others is held against it: how the logarithm of its cost hangs on
+/// shared parts, and its variance.
 #[derive(Debug, Clone)]
 pub(crate) struct Running {
     slopes: Slopes,
     variance: f64,
 }
 
-/// What is expected of an observation, as natural logarithms: its deviation from the prediction, and the variances of that in the shared and in
-/// the own parts.
+/// What is expected of an observation, as natural logarithms: its deviation from the prediction, and the variances of
+/// that in the shared and in the own parts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Expected {
     pub(crate) ln: f64,
@@ -93,8 +102,9 @@ pub(crate) struct Expected {
 }
 
 impl Belief {
-    /// The belief in predictions of which nothing was observed. `kept` says for each algorithm where it finds what the frame before left, if a frame
-    /// is cheaper for it after one that was alike: one number for all that share it.
+    /// The belief in predictions of which nothing was observed. `kept` says for each algorithm where it finds what
+    /// the frame before left, if a frame is cheaper for it after one that was alike: one number for all that share
+    /// it.
     pub(crate) fn new(costs: &[AlgorithmCost], kept: &[Option<usize>], deviations: Deviations) -> Self {
         let places = costs.iter().flat_map(AlgorithmCost::residuals).map(|r| Arc::clone(&r.places)).next();
         let mut parts: Vec<Part<'_>> = Vec::new();
@@ -144,7 +154,8 @@ impl Belief {
         self.basis.view(frame)
     }
 
-    /// What the shared parts add to the logarithm of an algorithm's cost of which calls are that share, and which parts do with their slopes.
+    /// What the shared parts add to the logarithm of an algorithm's cost of which calls are that share, and which
+    /// parts do with their slopes.
     fn shared(&self, algorithm: usize, calls: f64) -> (f64, Slopes) {
         let parts = &self.algorithms[algorithm];
         let mut slopes = [(0, 0.0); SHARED];
@@ -152,7 +163,8 @@ impl Belief {
         slopes[1] = parts.kept.map_or((0, 0.0), |k| (k, 1.0));
         let mut ln = self.mean[parts.class] + slopes[1].1 * self.mean[slopes[1].0];
         if let Some(width) = parts.width {
-            // A factor on the calls alone. What it adds to the whole is not linear in its logarithm; its slope is that of the present one.
+            // A factor on the calls alone. What it adds to the whole is not linear in its logarithm; its slope is
+            // that of the present one.
             let called = calls * self.mean[width + 1].exp();
             let whole = 1.0 - calls + called;
             slopes[2] = (width, 1.0);
@@ -163,7 +175,8 @@ impl Belief {
         (ln + self.mean[parts.method], slopes)
     }
 
-    /// Expected natural logarithm of real over predicted time of an algorithm of whose predicted time calls are that share.
+    /// Expected natural logarithm of real over predicted time of an algorithm of whose predicted time calls are that
+    /// share.
     pub(crate) fn deviation_ln(&self, algorithm: usize, view: &View, calls: f64) -> f64 {
         let own = &self.own[algorithm].mean;
         let curve = view.of(self.algorithms[algorithm].by_motion);
@@ -220,9 +233,9 @@ impl Belief {
         Running { variance: self.between(&slopes, &slopes) + self.own_variance(algorithm, view), slopes }
     }
 
-    /// What frames of another algorithm would tell of the logarithm of its cost over that of the one that runs, which is known by then: the standard
-    /// deviation of by how much they are expected to correct it. `noise` is the variance of the mean of their logarithms. What both have in common says
-    /// nothing of the ratio.
+    /// What frames of another algorithm would tell of the logarithm of its cost over that of the one that runs, which
+    /// is known by then: the standard deviation of by how much they are expected to correct it. `noise` is the
+    /// variance of the mean of their logarithms. What both have in common says nothing of the ratio.
     pub(crate) fn told_of_ratio(&self, running: &Running, tried: usize, view: &View, calls: f64, noise: f64) -> f64 {
         let slopes = self.shared(tried, calls).1;
         let in_common = self.between(&slopes, &running.slopes).powi(2) / running.variance.max(f64::MIN_POSITIVE);
@@ -230,7 +243,8 @@ impl Belief {
         if variance + noise > 0.0 { variance / (variance + noise).sqrt() } else { 0.0 }
     }
 
-    /// Takes in that the observation that was [expected](Self::expect) last was off by `error`, where errors have this variance.
+    /// Takes in that the observation that was [expected](Self::expect) last was off by `error`, where errors have
+    /// this variance.
     pub(crate) fn absorb(&mut self, algorithm: usize, error: f64, variance: f64) {
         let size = self.mean.len();
         let gain = error / variance;
@@ -250,8 +264,9 @@ impl Belief {
         }
     }
 
-    /// Takes in that a frame took the algorithm `ratio` times what was predicted, of which calls are that share. `noise_ln` is the standard deviation of
-    /// its logarithm. Whether it could be taken in: a time that is no positive number tells nothing.
+    /// Takes in that a frame took the algorithm `ratio` times what was predicted, of which calls are that share.
+    /// `noise_ln` is the standard deviation of its logarithm. Whether it could be taken in: a time that is no
+    /// positive number tells nothing.
     pub(crate) fn observe(&mut self, algorithm: usize, view: &View, ratio: f64, calls: f64, noise_ln: f64) -> bool {
         let expected = self.expect(algorithm, view, calls);
         let surprise = ratio.ln() - expected.ln;
@@ -277,8 +292,9 @@ impl Belief {
         self.fade();
     }
 
-    /// Boxes moved so far in a frame, in edges, when it was observed how much keeping work spares, and move so far now. What a scene spares at one
-    /// pace tells the less of another the further that is. False where it is about the same pace, and nothing is forgotten.
+    /// Boxes moved so far in a frame, in edges, when it was observed how much keeping work spares, and move so far
+    /// now. What a scene spares at one pace tells the less of another the further that is. False where it is about
+    /// the same pace, and nothing is forgotten.
     pub(crate) fn change_pace(&mut self, before: f64, now: f64) -> bool {
         let away = paces_apart_ln(before, now);
         if away < SAME_PACE_LN {
@@ -307,13 +323,14 @@ impl Belief {
         }
     }
 
-    /// What was observed of shared parts is as uncertain as if it was forgotten. The means stay: nothing better is known.
+    /// What was observed of shared parts is as uncertain as if it was forgotten. The means stay: nothing better is
+    /// known.
     pub(crate) fn doubt_shared(&mut self) {
         set_diagonal(&mut self.covariance, self.later.iter().copied());
     }
 
-    /// What was observed of an algorithm's own part holds no longer, and it may be off by this much. Not of one that keeps work from frame to
-    /// frame: what changes it is the scene, whose part is forgotten sooner than an own one.
+    /// What was observed of an algorithm's own part holds no longer, and it may be off by this much. Not of one that
+    /// keeps work from frame to frame: what changes it is the scene, whose part is forgotten sooner than an own one.
     pub(crate) fn doubt_own(&mut self, algorithm: usize, ln: f64) {
         if self.algorithms[algorithm].kept.is_some() {
             return;
@@ -325,8 +342,9 @@ impl Belief {
         }
     }
 
-    /// The costs as they are expected now, with the spread that is left in their own parts and the noise of an observation, a standard deviation of its
-    /// logarithm. What passes is left out where only what lasts is asked for: the parts of widths and of what is kept.
+    /// The costs as they are expected now, with the spread that is left in their own parts and the noise of an
+    /// observation, a standard deviation of its logarithm. What passes is left out where only what lasts is asked
+    /// for: the parts of widths and of what is kept.
     pub(crate) fn costs(&self, costs: &[AlgorithmCost], lasting: bool, noise_ln: f64) -> Vec<AlgorithmCost> {
         let corrected = |(k, cost): (usize, &AlgorithmCost)| {
             let (parts, own) = (&self.algorithms[k], &self.own[k]);

@@ -35,7 +35,8 @@ pub(crate) fn exception(py: Python<'_>, error: &Error, which: &str) -> PyErr {
         }
         Error::TooManyPairs { limit } => {
             let text = format!(
-                "more pairs overlap than the limit of {limit}; raise it with `limit=`, at about 30 bytes of memory a pair, \
+                "more pairs overlap than the limit of {limit}; raise it with `limit=`, at about 30 bytes of memory a \
+                 pair, \
                  or thin out the scene"
             );
             instance(py, "TooManyPairsError", (text, limit))

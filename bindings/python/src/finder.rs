@@ -139,7 +139,8 @@ impl PyBroadPhase {
         if !measure {
             options = options.measure(None);
         }
-        let keeps = algorithm.is_none() && tuning.is_none() && !matches!(cache.map(|c| c.extract::<bool>()), Some(Ok(false)));
+        let no_cache = matches!(cache.map(|c| c.extract::<bool>()), Some(Ok(false)));
+        let keeps = algorithm.is_none() && tuning.is_none() && !no_cache;
         let tuning = tuning.map(|t| t.tuning.clone());
         let order = start::order(ordered);
         let start = Start { options, keeps, learning, exploring, threads, algorithm, tuning, order, limit };
@@ -291,7 +292,8 @@ impl PyBroadPhase {
         self.with(py, |frames| PyTuning::from(frames.adaptive.learned()))
     }
 
-    /// dict: where the tuning came from (``origin``), ``remarks`` on what went wrong, ``seconds``, the ``file`` of the cache.
+    /// dict: where the tuning came from (``origin``), ``remarks`` on what went wrong, ``seconds``, the ``file`` of
+    /// the cache.
     #[getter]
     fn setup<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let setup = self.with(py, |frames| frames.adaptive.setup().clone())?;

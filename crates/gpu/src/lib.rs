@@ -1,8 +1,8 @@
 //! Algorithms on GPUs through wgpu: Vulkan, Metal and DX12 from one shader source each.
 //!
 //! [`Gpus::find`] looks for adapters, and [`add_to`] adds the algorithms on them to a
-//! [`Registry`](sapwise::Registry). Without that call no driver is loaded. Drivers are found at run time: a program that uses this crate
-//! also runs without any.
+//! [`Registry`](sapwise::Registry). Without that call no driver is loaded. Drivers are found at run time: a program
+//! that uses this crate also runs without any.
 //!
 //! ```
 //! use sapwise::{Aabb, Adaptive, BroadPhase, Pairs, Registry, Tuning};
@@ -40,7 +40,8 @@
 //! | `bvh` | a tree over all boxes, in the order of a Hilbert curve; eight consecutive boxes form a node |
 //!
 //! A GPU that is lost, refuses memory, executes nothing or does not answer within a minute is
-//! [`Error::Unavailable`](sapwise::Error). [`Adaptive`](sapwise::Adaptive) then runs the same frame on another algorithm.
+//! [`Error::Unavailable`](sapwise::Error). [`Adaptive`](sapwise::Adaptive) then runs the same frame on another
+//! algorithm.
 
 mod adapters;
 mod brute;

@@ -20,7 +20,8 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// The regret on a report of the model that was trained without its machine, and of each algorithm when it is chosen always.
+/// The regret on a report of the model that was trained without its machine, and of each algorithm when it is chosen
+/// always.
 pub(crate) fn leave_one_out(folder: &Path, file: &str) -> Result<String> {
     let reports = read_reports(&[folder.to_owned()], &Silent)?;
     let (profiles, _) = Selection::of(&reports).finish();

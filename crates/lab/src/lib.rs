@@ -2,7 +2,8 @@
 //!
 //! A [`report`](report::Report) holds what was measured on one machine. The way from reports to a model is
 //!
-//! 1. [`data`]: a report becomes a [`Profile`](data::Profile), and a [`Selection`](data::Selection) of them what can be trained on;
+//! 1. [`data`]: a report becomes a [`Profile`](data::Profile), and a [`Selection`](data::Selection) of them what can
+//!    be trained on;
 //! 2. [`fit`]: cost terms are fitted to the profiles, which makes a [`Model`](sapwise_tune::Model);
 //! 3. [`evaluate`]: each machine is held out in turn, and every strategy is judged on it by its regret;
 //! 4. [`train()`]: all of it, with what [`Training`] says of itself.

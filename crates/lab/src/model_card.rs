@@ -11,11 +11,12 @@ use std::collections::BTreeMap;
 
 /// Method and use, the same for every model.
 const USE: &str = "
-Predicts the time of each broad-phase algorithm from the hardware parameters of a machine and the load of a frame; `sapwise predict` derives which
-algorithm is fastest where. The time on one thread is a sum of physical terms with non-negative units: calls, objects, sorting, objects outside the
-cache, tests, pairs, motion. Each term scales with a parameter: clock, SIMD lanes or memory bandwidth. A Gaussian process over the load, the residual,
-multiplies the sum. `pair-cache` takes the smaller of its own sum and that of `bvh`. On several threads the work is divided by the speed-up, plus the
-calls of the helpers and what is lost while they wake up. All machines share these units.
+Predicts the time of each broad-phase algorithm from the hardware parameters of a machine and the load of a frame;
+`sapwise predict` derives which algorithm is fastest where. The time on one thread is a sum of physical terms with
+non-negative units: calls, objects, sorting, objects outside the cache, tests, pairs, motion. Each term scales with
+a parameter: clock, SIMD lanes or memory bandwidth. A Gaussian process over the load, the residual, multiplies the
+sum. `pair-cache` takes the smaller of its own sum and that of `bvh`. On several threads the work is divided by the
+speed-up, plus the calls of the helpers and what is lost while they wake up. All machines share these units.
 
 Not for timing promises: a predicted time may be further off than the choice that follows from it.";
 
@@ -25,33 +26,38 @@ const NO_GPUS: &str = " Not for GPUs.\n";
 /// Of a model with GPUs, after [`USE`].
 const GPUS: &str = "
 
-On GPUs the terms are round trips, dependent dispatches, bytes up and down, bytes moved within the memory of the GPU, tests, and the cycles that the
-CPU spends on boxes and pairs. Several GPUs count with the slowest latency and the sum of their rates. Software adapters are used only if no real GPU was
-in the training.
+On GPUs the terms are round trips, dependent dispatches, bytes up and down, bytes moved within the memory of the
+GPU, tests, and the cycles that the CPU spends on boxes and pairs. Several GPUs count with the slowest latency and
+the sum of their rates. Software adapters are used only if no real GPU was in the training.
 ";
 
 /// What the columns of the scores mean.
 const COLUMNS: &str = "
-Regret is the time of the chosen algorithm over that of the best one, less one. Each number is the mean over scenarios and quarters of a decade of
-objects and, in parentheses, weighted by how often games have that many objects. That weight is an assumption: log-normal around 800, two thirds of the
-frames between 220 and 2800. Every host counts the same. A choice that was not timed nearby is charged ten times the best.
+Regret is the time of the chosen algorithm over that of the best one, less one. Each number is the mean over
+scenarios and quarters of a decade of objects and, in parentheses, weighted by how often games have that many
+objects. That weight is an assumption: log-normal around 800, two thirds of the frames between 220 and 2800. Every
+host counts the same. A choice that was not timed nearby is charged ten times the best.
 
-- **unseen scenario**: the host and the scenario were held out. A user's scene is none of ours: this is the number that counts.
+- **unseen scenario**: the host and the scenario were held out. A user's scene is none of ours: this is the number
+  that counts.
 - **seen scenario**: only the host was held out. **least to largest**: of the hosts.
 - **one thread**, **several**: seen scenarios, by the threads of the report.
 - **by means**: judged by the mean over frames instead of the median, which includes rebuilds and interruptions.
-- **crossovers off by**: median distance between measured and predicted crossovers in `uniform`; an octave is a factor of two in objects.
+- **crossovers off by**: median distance between measured and predicted crossovers in `uniform`; an octave is a
+  factor of two in objects.
 - **over 10 %**: share of the cells in which the choice cost a tenth more than the best, or worse.
-- **floor**: the best of the same cell in a repeated run. **another run's full sweep** chooses by the costs of that run. Smaller differences say
-  nothing.
+- **floor**: the best of the same cell in a repeated run. **another run's full sweep** chooses by the costs of that
+  run. Smaller differences say nothing.
 ";
 
 /// What the strategies are.
 const STRATEGIES: &str = "
-`physics + load` is what `predict` does, `physics` the same without the residual. `random forest` predicts times from load and parameters.
-`nearest machine` takes the measured costs of the most similar host. `direct regression` is the paper's: crossovers as power laws of parameters, and a
-choice by the number of objects. `frozen constants` switch from brute force at 64 (nexus) or 1000 objects (mujoco_warp). `single best` is always the
-same algorithm. `full sweep` has measured the held-out host itself and is judged by the same timings, in an unseen scenario by the others.
+`physics + load` is what `predict` does, `physics` the same without the residual. `random forest` predicts times
+from load and parameters. `nearest machine` takes the measured costs of the most similar host. `direct regression`
+is the paper's: crossovers as power laws of parameters, and a choice by the number of objects. `frozen constants`
+switch from brute force at 64 (nexus) or 1000 objects (mujoco_warp). `single best` is always the same algorithm.
+`full sweep` has measured the held-out host itself and is judged by the same timings, in an unseen scenario by the
+others.
 ";
 
 /// Returns the model card as a page of Markdown, with the notes of the training.
@@ -125,8 +131,10 @@ fn intervals(validation: &Validation) -> String {
         return "None: fewer than two hosts were held out.\n".to_owned();
     };
     format!(
-        "On {} held out, nine of ten times lay within a factor of {:.2} of their prediction, and nine of ten ratios of the two fastest algorithms \
-         within {:.2}, which makes the intervals of predicted crossovers. The factors of the other hosts held for {} of the times of a host and for {} \
+        "On {} held out, nine of ten times lay within a factor of {:.2} of their prediction, and nine of ten ratios \
+         of the two fastest algorithms \
+         within {:.2}, which makes the intervals of predicted crossovers. The factors of the other hosts held for {} \
+         of the times of a host and for {} \
          of the ratios.\n",
         count(c.physical_machines, "host"),
         c.times_90_ln.exp(),

@@ -5,7 +5,8 @@
 #[error("interrupted before the end; there is no result")]
 pub struct Interrupted;
 
-/// Receives the progress of long work. Work of several parts starts each with its own number of steps. [`Silent`] ignores all of it.
+/// Receives the progress of long work. Work of several parts starts each with its own number of steps. [`Silent`]
+/// ignores all of it.
 pub trait Progress: Sync {
     /// Begins a part of `steps` steps.
     fn start(&self, steps: u64);

@@ -74,8 +74,8 @@ impl Machine {
         ]
     }
 
-    /// Eight machines, all but the last of the family, each with one GPU and two of them with a second one; the eighth is the
-    /// first again with the GPU of a server.
+    /// Eight machines, all but the last of the family, each with one GPU and two of them with a second one; the
+    /// eighth is the first again with the GPU of a server.
     pub(crate) fn family_with_gpus() -> Vec<Self> {
         use GpuKind::{Discrete, Integrated};
         let gpus = [
@@ -131,8 +131,8 @@ impl Machine {
         hardware.with_gpus(gpus).with_gpu_groups(gpu_groups)
     }
 
-    /// A full sweep: 23 sizes from 16 to 700 000 objects of two scenarios; from 500 objects up whoever is eight times slower than
-    /// the best leaves the race, on a GPU only whoever doesn't gain.
+    /// A full sweep: 23 sizes from 16 to 700 000 objects of two scenarios; from 500 objects up whoever is eight times
+    /// slower than the best leaves the race, on a GPU only whoever doesn't gain.
     pub(crate) fn report(&self) -> Report {
         let hardware = self.hardware();
         let mut random = Random::named(u64::from(self.cores) * 1000 + self.ghz.to_bits() % 997, &[]);
@@ -225,7 +225,8 @@ fn point(scenario: &str, load: Load, timings: Vec<Timing>) -> Point {
     }
 }
 
-/// Loads like those of a constant density that moves little, and of clusters of growing density that move less and less.
+/// Loads like those of a constant density that moves little, and of clusters of growing density that move less and
+/// less.
 pub(crate) fn load(scenario: &str, n: f64) -> Load {
     let (axis, strip, pairs, moved) = match scenario {
         "uniform" => (0.3 * n.powf(5.0 / 3.0), 4.0 * n, 1.0 * n, 0.04),
@@ -245,7 +246,8 @@ fn of(terms: &[(Term, Scale, f64)]) -> Vec<ModelTerm> {
     terms.iter().map(|&(term, scale, unit)| ModelTerm { term, scale, unit }).collect()
 }
 
-/// The costs on GPUs that the reports are made from: those that are counted, each dearer than the hardware parameters say.
+/// The costs on GPUs that the reports are made from: those that are counted, each dearer than the hardware parameters
+/// say.
 pub(crate) fn gpu_truth() -> Vec<MethodModel> {
     let truth = |name: &str, operations: f64| {
         let dearer = |term, scale| match (scale, term) {

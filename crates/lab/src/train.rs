@@ -10,7 +10,8 @@ use anyhow::{Result, bail};
 use sapwise_tune::Model;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Most reports that a training lists; it counts more. One takes 130 bytes, and the built-in model is part of the library.
+/// Most reports that a training lists; it counts more. One takes 130 bytes, and the built-in model is part of the
+/// library.
 const MOST_LISTED: usize = 400;
 
 /// A model and how well it did.
@@ -26,7 +27,8 @@ pub struct Trained {
     pub held_out: HeldOut,
 }
 
-/// Fits a model to all profiles but those that are held out together with that of `file`, and returns it with what these are.
+/// Fits a model to all profiles but those that are held out together with that of `file`, and returns it with what
+/// these are.
 ///
 /// # Errors
 /// When there are no others, or no model can be fitted to them.
@@ -46,7 +48,8 @@ pub fn without(profiles: &[Profile], file: &str) -> Result<(Model, String)> {
 /// Fits the model called `name` to the selected reports, and validates it.
 ///
 /// # Errors
-/// When no report can be used, with the reasons and what to do; when no method can be fitted; when the user asked to stop.
+/// When no report can be used, with the reasons and what to do; when no method can be fitted; when the user asked to
+/// stop.
 pub fn train(selection: Selection, name: &str, progress: &dyn Progress) -> Result<Trained> {
     let (profiles, mut notes) = selection.finish();
     if profiles.is_empty() {

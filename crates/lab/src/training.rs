@@ -49,8 +49,8 @@ pub struct TrainingCount {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub struct Validation {
-    /// What was held out in turn: `physical machine`, or `one of 10 groups of physical machines`. With one physical machine only it is
-    /// `SIMD level and thread count`, or `profile`, which says little about other machines.
+    /// What was held out in turn: `physical machine`, or `one of 10 groups of physical machines`. With one physical
+    /// machine only it is `SIMD level and thread count`, or `profile`, which says little about other machines.
     pub held_out: String,
     /// Physical machines in the data.
     pub physical_machines: usize,
@@ -118,14 +118,15 @@ pub struct Coverage {
     pub ratios: f64,
 }
 
-/// The score of one strategy. Regret is the time of its choice over the time of the best, less one. Every physical machine counts the same,
-/// however many reports it has.
+/// The score of one strategy. Regret is the time of its choice over the time of the best, less one. Every physical
+/// machine counts the same, however many reports it has.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub struct MethodScore {
     /// Name of the strategy.
     pub name: String,
-    /// Mean regret over the cells of a held-out report, each a quarter of a decade of a scenario, then over the reports.
+    /// Mean regret over the cells of a held-out report, each a quarter of a decade of a scenario, then over the
+    /// reports.
     pub mean_regret: f64,
     /// Least mean regret of a held-out machine, or of a held-out report if all are of one machine.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -151,8 +152,8 @@ pub struct MethodScore {
     pub share_over_10_percent: f64,
     /// How much of the gap between the best single algorithm (0) and the best choice (1) it closes.
     pub closed_gap: f64,
-    /// Mean regret weighted as in games, which is an assumption: log-normal around 800 objects, two thirds of the frames between 220 and
-    /// 2800.
+    /// Mean regret weighted as in games, which is an assumption: log-normal around 800 objects, two thirds of the
+    /// frames between 220 and 2800.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mean_regret_in_games: Option<f64>,
     /// Least of the same of a held-out machine or report.
@@ -164,8 +165,9 @@ pub struct MethodScore {
     /// 95th percentile over held-out reports of the same.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub p95_regret_in_games: Option<f64>,
-    /// Median distance between measured and predicted crossovers, in octaves. If the predicted costs don't cross within the measured sizes,
-    /// the distance to the end beyond which they would, a lower bound. `None` for a strategy that predicts no costs.
+    /// Median distance between measured and predicted crossovers, in octaves. If the predicted costs don't cross
+    /// within the measured sizes, the distance to the end beyond which they would, a lower bound. `None` for a
+    /// strategy that predicts no costs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crossing_error_octaves: Option<f64>,
     /// Share of these crossovers that were predicted within half an octave.
@@ -203,7 +205,8 @@ impl Training {
         self.trained_on.len() + self.trained_on_counts.iter().map(|c| c.reports).sum::<usize>()
     }
 
-    /// Returns how many physical machines these reports are of. If only counts are kept, a machine counts once for each label.
+    /// Returns how many physical machines these reports are of. If only counts are kept, a machine counts once for
+    /// each label.
     #[must_use]
     pub fn physical_machines(&self) -> usize {
         let listed: BTreeSet<&str> = self.trained_on.iter().map(|r| r.host.as_str()).collect();

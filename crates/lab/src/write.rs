@@ -9,8 +9,9 @@ use std::time::Duration;
 
 /// Writes what `write` produces to `path`, so that a reader never sees half of it.
 ///
-/// The bytes go to a temporary file in the same folder, to the disk, and under their name by a rename. A link is followed.
-/// What isn't a regular file, such as `/dev/stdout` or a pipe, is written as it is: a rename would put a file in its place.
+/// The bytes go to a temporary file in the same folder, to the disk, and under their name by a rename. A link is
+/// followed. What isn't a regular file, such as `/dev/stdout` or a pipe, is written as it is: a rename would put a
+/// file in its place.
 ///
 /// # Errors
 /// Names `path`. The file that stood there, or its absence, is unchanged, and no temporary file is left.
@@ -44,7 +45,8 @@ pub(crate) fn is_temporary(name: &OsStr) -> bool {
     name.to_str().is_some_and(|name| name.starts_with(TEMPORARY[0]) && name.ends_with(TEMPORARY[1]))
 }
 
-/// A lock that lasts until the file is closed, as the system does for a program that is killed. `None` when another program has it.
+/// A lock that lasts until the file is closed, as the system does for a program that is killed. `None` when another
+/// program has it.
 fn locked(path: &Path) -> Option<File> {
     File::open(path).ok().filter(|file| file.try_lock().is_ok())
 }

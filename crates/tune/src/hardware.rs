@@ -23,7 +23,8 @@ pub use unit::with_unit;
 pub struct Hardware {
     /// Which machine it is.
     pub machine: Machine,
-    /// The parameters; a name appears at most once. A file may hold names that this version does not know; they are kept.
+    /// The parameters; a name appears at most once. A file may hold names that this version does not know; they are
+    /// kept.
     pub parameters: Vec<Parameter>,
     /// Its GPUs by number. Empty if there are none or none was measured.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -40,8 +41,8 @@ pub struct Hardware {
 pub struct Machine {
     /// Hash of CPU vendor, family, model, stepping and last-level cache, as 16 hex digits.
     ///
-    /// All profiles of one machine share it, so that validation holds them out together. Two machines with the same CPU model
-    /// share it too: to a model of hardware they are the same machine.
+    /// All profiles of one machine share it, so that validation holds them out together. Two machines with the same
+    /// CPU model share it too: to a model of hardware they are the same machine.
     pub physical_id: String,
     /// Brand text of the CPU.
     pub cpu: String,
@@ -64,8 +65,8 @@ impl Machine {
         Self { physical_id: physical_id.into(), ..Self::default() }
     }
 
-    /// Returns the name of the tuning file for machines of this kind,
-    /// which `sapwise predict --report FOLDER` writes: physical id, SIMD level, usable cores and the device numbers of its GPUs, as in
+    /// Returns the name of the tuning file for machines of this kind, which `sapwise predict --report FOLDER` writes:
+    /// physical id, SIMD level, usable cores and the device numbers of its GPUs, as in
     /// `478e43ba2e7824ab-avx512-16-10de2335.json`. Software adapters are left out.
     #[must_use]
     pub fn tuning_file(&self, cores: u32, gpus: &[GpuIdentity]) -> String {
@@ -163,7 +164,8 @@ impl Hardware {
     }
 }
 
-/// Lowest foreign load that is reported, a share of the CPU: in one window rounding alone may show [`Parameter::SPOILING`].
+/// Lowest foreign load that is reported, a share of the CPU: in one window rounding alone may show
+/// [`Parameter::SPOILING`].
 const REPORTED_LOAD: f64 = 2.0 * Parameter::SPOILING;
 
 /// Which parameters of a list were measured while other programs took too much of the CPU.
@@ -172,7 +174,8 @@ fn loaded(of: &str, parameters: &[Parameter]) -> Option<String> {
     let spoiled: Vec<(&str, f64)> = loads.filter(|(_, load)| *load > REPORTED_LOAD).collect();
     let (name, load) = spoiled.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
     Some(format!(
-        "other programs or the host took more than {:.0} % of the CPU while {} of the parameters{of} were measured, {:.0} % with \
+        "other programs or the host took more than {:.0} % of the CPU while {} of the parameters{of} were measured, \
+         {:.0} % with \
          {name}; unless that is intended, probe again when the machine is idle",
         REPORTED_LOAD * 100.0,
         spoiled.len(),
@@ -187,7 +190,8 @@ fn moved(parameters: &[Parameter]) -> Option<String> {
     let [low, high] = [0.1, 0.9].map(|q| sapwise::internals::stats::quantile(&distance.raw, q));
     let (low, high) = low.zip(high).filter(|(low, high)| *high > 2.0 * low)?;
     Some(format!(
-        "a cache line took {low:.0} ns from core to core in some samples and {high:.0} ns in others: the program or the virtual CPUs \
+        "a cache line took {low:.0} ns from core to core in some samples and {high:.0} ns in others: the program or \
+         the virtual CPUs \
          moved to other cores meanwhile, so what was measured on several cores mixes both places; probe again"
     ))
 }
@@ -232,7 +236,8 @@ mod tests {
     fn parameters_without_an_id_are_written_back_as_they_were_read() {
         let text = r#"{"machine":{"physical_id":"0123456789abcdef","cpu":"","vendor":"","arch":"","os":"","simd":"avx2",
             "hypervisor":"none"},"parameters":[{"name":"arithmetic_one_thread_gflop_per_s","value":2.5,"dispersion":0.6,
-            "samples":4,"spoiled":1,"foreign_load":0.01,"how":"measured","source":"fused multiply-adds","raw":[4.0,1.0,3.0,2.0]}],
+            "samples":4,"spoiled":1,"foreign_load":0.01,"how":"measured","source":"fused \
+             multiply-adds","raw":[4.0,1.0,3.0,2.0]}],
             "gpus":[{"gpu":{"index":0,"name":"a","device":"10de:2335","driver":"b","api":"vulkan","kind":"discrete"},
             "parameters":[{"name":"atomic_g_per_s","value":720.976,"dispersion":null,"samples":1,"spoiled":0,
             "foreign_load":null,"how":"reported","source":"c"},{"name":"parallel_units","value":132.0,"dispersion":0.0,

@@ -23,10 +23,12 @@ pub use scale::Scale;
 /// Prefix of a GPU's parameter in a [`Range`]: `gpu/upload_rate_gb_per_s`.
 pub const GPU_PREFIX: &str = "gpu/";
 
-/// A cost model for every method and class of processor, shared by machines, thread counts and GPUs, evaluated by plain arithmetic.
+/// A cost model for every method and class of processor, shared by machines, thread counts and GPUs, evaluated by
+/// plain arithmetic.
 ///
-/// The time of a frame on one thread, or on GPUs, is `sum of unit * scale(hardware, backend) * term(load)`, times `exp` of a
-/// [residual](sapwise::internals::Residual) over the load. [Helpers](HelpersModel) turn it into the time on several threads.
+/// The time of a frame on one thread, or on GPUs, is `sum of unit * scale(hardware, backend) * term(load)`, times
+/// `exp` of a [residual](sapwise::internals::Residual) over the load. [Helpers](HelpersModel) turn it into the time
+/// on several threads.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
@@ -38,8 +40,8 @@ pub struct Model {
     pub simulated: bool,
     /// Lowest and highest value of each hardware parameter in training; a machine outside is extrapolated.
     pub ranges: Vec<Range>,
-    /// On held-out machines nine of ten ratios of the times of two algorithms were within a factor of e to this of their prediction.
-    /// `None` if fewer than two machines were held out.
+    /// On held-out machines nine of ten ratios of the times of two algorithms were within a factor of e to this of
+    /// their prediction. `None` if fewer than two machines were held out.
     pub ratios_90_ln: Option<f64>,
     /// Loads at which the residuals of all methods are known.
     pub places: Arc<Places>,
@@ -190,7 +192,8 @@ impl Model {
         Self { places, ..self }
     }
 
-    /// Returns the hardware parameters that a prediction reads, without those of GPUs, each once: for costs and for ranges.
+    /// Returns the hardware parameters that a prediction reads, without those of GPUs, each once: for costs and for
+    /// ranges.
     #[must_use]
     pub fn parameters(&self) -> Vec<ParameterId> {
         let of_method = |m: &MethodModel| {

@@ -1,4 +1,5 @@
-//! A plugin that an author of a Bevy app would write around Sapwise: which entities overlap, and which have begun and ceased to.
+//! A plugin that an author of a Bevy app would write around Sapwise: which entities overlap, and which have begun and
+//! ceased to.
 //!
 //! ```
 //! use bevy_app::{App, Startup};
@@ -45,11 +46,13 @@ pub struct BoxCollider {
 #[derive(Message, Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct OverlapBegun(pub Entity, pub Entity);
 
-/// Two entities whose boxes overlapped in the fixed step before and don't now, or of which one is gone; the lower one first.
+/// Two entities whose boxes overlapped in the fixed step before and don't now, or of which one is gone; the lower one
+/// first.
 #[derive(Message, Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct OverlapEnded(pub Entity, pub Entity);
 
-/// The systems that find overlaps, in [`FixedUpdate`]. What moves entities there runs before, what reads [`Overlaps`] after.
+/// The systems that find overlaps, in [`FixedUpdate`]. What moves entities there runs before, what reads [`Overlaps`]
+/// after.
 #[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct SapwiseSystems;
 
@@ -64,8 +67,8 @@ impl Plugin for SapwisePlugin {
         if !app.is_plugin_added::<TransformPlugin>() {
             app.add_plugins(TransformPlugin);
         }
-        // Bevy brings `GlobalTransform` up to date after all fixed steps of a frame: without these three systems the boxes
-        // would be those of the frame before.
+        // Bevy brings `GlobalTransform` up to date after all fixed steps of a frame: without these three systems the
+        // boxes would be those of the frame before.
         let systems = (mark_dirty_trees, propagate_parent_transforms, sync_simple_transforms, find_overlaps);
         app.init_resource::<Overlaps>()
             .add_message::<OverlapBegun>()

@@ -1,4 +1,5 @@
-//! A headless Bevy app: entities are spawned in bursts, drift in a box and are despawned; begun and ended overlaps are counted.
+//! A headless Bevy app: entities are spawned in bursts, drift in a box and are despawned; begun and ended overlaps
+//! are counted.
 
 use bevy_app::{App, AppExit, FixedUpdate, ScheduleRunnerPlugin, TaskPoolPlugin};
 use bevy_ecs::prelude::*;
@@ -98,7 +99,8 @@ fn main() -> ExitCode {
         Some(Ok(steps)) if steps > 0 => steps,
         Some(_) => {
             eprintln!(
-                "usage: cargo run --release -p sapwise-example-bevy -- [STEPS]\n\nSTEPS is a number above 0; {STEPS} unless given"
+                "usage: cargo run --release -p sapwise-example-bevy -- [STEPS]\n\nSTEPS is a number above 0; {STEPS} \
+                 unless given"
             );
             return ExitCode::from(2);
         }

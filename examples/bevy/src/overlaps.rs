@@ -14,8 +14,8 @@ pub struct Overlaps {
 }
 
 impl FromWorld for Overlaps {
-    /// Over all cores, with the borders that are written down in Sapwise. An app that has measured or predicted the borders of the
-    /// machine at hand inserts its own with [`Overlaps::new`] before it adds the plugin.
+    /// Over all cores, with the borders that are written down in Sapwise. An app that has measured or predicted the
+    /// borders of the machine at hand inserts its own with [`Overlaps::new`] before it adds the plugin.
     fn from_world(_: &mut World) -> Self {
         let registry = Registry::new();
         let adaptive = Adaptive::new(Tuning::usual(&registry), &registry);
@@ -42,7 +42,8 @@ impl Overlaps {
         self.changes.begun()
     }
 
-    /// The pairs that overlapped in the step before and don't now, sorted. Those of an entity that is gone are among them.
+    /// The pairs that overlapped in the step before and don't now, sorted. Those of an entity that is gone are among
+    /// them.
     #[must_use]
     pub fn ended(&self) -> &[(Entity, Entity)] {
         self.changes.ended()

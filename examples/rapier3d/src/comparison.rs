@@ -7,27 +7,28 @@ use std::fmt;
 
 /// What rapier adds to every side of a box that left the one it keeps, as a share of its unit of length.
 ///
-/// `BroadPhaseBvh::CHANGE_DETECTION_FACTOR` of rapier 0.36, which is private. Another release may have another: then the boxes
-/// that it keeps are others, and [`Comparison::after_step`] names the first pair that tells.
+/// `BroadPhaseBvh::CHANGE_DETECTION_FACTOR` of rapier 0.36, which is private. Another release may have another: then
+/// the boxes that it keeps are others, and [`Comparison::after_step`] names the first pair that tells.
 const MARGIN: f32 = 0.04;
 
 /// Both broad phases in one step of a simulation.
 ///
 /// # What is compared
-/// Rapier keeps a box for each collider: the collider's own box, grown by half the prediction distance (1 cm for a unit of length of
-/// 1 m). Where a later box leaves the one that is kept, it is kept anew, grown by another 4 cm. The kept boxes that
-/// overlap, touching ones included, are rapier's pairs; but two of which none moves are no pair, nor are two whose collision groups don't let
-/// each other through, nor two colliders of one body. A contact pair is handed to the narrow phase for each pair, and for no
-/// other, whether its bodies sleep or not.
+/// Rapier keeps a box for each collider: the collider's own box, grown by half the prediction distance (1 cm for a
+/// unit of length of 1 m). Where a later box leaves the one that is kept, it is kept anew, grown by another 4 cm. The
+/// kept boxes that overlap, touching ones included, are rapier's pairs; but two of which none moves are no pair, nor
+/// are two whose collision groups don't let each other through, nor two colliders of one body. A contact pair is
+/// handed to the narrow phase for each pair, and for no other, whether its bodies sleep or not.
 ///
-/// Sapwise leaves out the first two kinds by a [`Filter`], before they are written. Of bodies it knows nothing: the third kind is left
-/// out afterwards.
+/// Sapwise leaves out the first two kinds by a [`Filter`], before they are written. Of bodies it knows nothing: the
+/// third kind is left out afterwards.
 ///
 /// In every step two things hold, or there is a [`Mismatch`]:
 ///
 /// 1. The boxes as rapier keeps them, in an [`Adaptive`] of their own, give rapier's pairs, all of them and no other.
-/// 2. The colliders' own boxes, in another [`Adaptive`], give those of rapier's pairs whose own boxes overlap, all of them and no
-///    other. These are the boxes that an engine without margins hands over, and the ones that are recorded.
+/// 2. The colliders' own boxes, in another [`Adaptive`], give those of rapier's pairs whose own boxes overlap, all of
+///    them and no other. These are the boxes that an engine without margins hands over, and the ones that are
+///    recorded.
 pub struct Comparison {
     own: Side,
     kept: Side,
@@ -128,8 +129,8 @@ impl Comparison {
         self.own.broad_phase.last_decision()
     }
 
-    /// Takes the boxes of all colliders and finds their pairs. Rapier finds its own from the same boxes at the beginning of the
-    /// step that comes next, so nothing may be moved, added or removed before that.
+    /// Takes the boxes of all colliders and finds their pairs. Rapier finds its own from the same boxes at the
+    /// beginning of the step that comes next, so nothing may be moved, added or removed before that.
     ///
     /// # Errors
     /// As [`BroadPhase::find_pairs`].
@@ -239,7 +240,8 @@ mod tests {
     use super::*;
     use crate::{Settings, World};
 
-    /// The outcome of step 100 where `spoil` was at work between finding the pairs and rapier's step, and the outcome without it.
+    /// The outcome of step 100 where `spoil` was at work between finding the pairs and rapier's step, and the outcome
+    /// without it.
     fn outcomes(spoil: impl Fn(&mut Comparison, &PhysicsWorld)) -> [Result<Counts, Mismatch>; 2] {
         [true, false].map(|spoiled| {
             let mut world = World::new(Settings { bodies: 100, seed: 4 });

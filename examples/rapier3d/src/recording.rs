@@ -30,8 +30,8 @@ impl Recording {
         self.frames().map(<[Aabb]>::len).max().unwrap_or(0)
     }
 
-    /// Writes a `.npy` array of little-endian float32, of shape frames x most boxes x 6: lowest x, y and z, then highest x, y and z, in the
-    /// unit of length of the boxes. A frame with fewer boxes ends in rows of six NaN.
+    /// Writes a `.npy` array of little-endian float32, of shape frames x most boxes x 6: lowest x, y and z, then
+    /// highest x, y and z, in the unit of length of the boxes. A frame with fewer boxes ends in rows of six NaN.
     ///
     /// # Errors
     /// Those of `out`.

@@ -98,8 +98,8 @@ impl World {
         self.cubes.len()
     }
 
-    /// What the program does between two steps: it drops whole cubes, breaks those that were hit hard or whose turn it is, and clears
-    /// the oldest away.
+    /// What the program does between two steps: it drops whole cubes, breaks those that were hit hard or whose turn
+    /// it is, and clears the oldest away.
     pub fn prepare_step(&mut self) {
         let at = self.step % CYCLE;
         let burst = at % BURST == BURST - 1;

@@ -17,7 +17,7 @@ use std::str::FromStr;
 Examples:
   sapwise run fragmentation
   sapwise run fragmentation --tuning report.json --plot run.svg    # a tuning that was measured on this machine
-  sapwise run fragmentation --tuning elsewhere.json --after 300    # the tuning of another machine, corrected by learning
+  sapwise run fragmentation --tuning elsewhere.json --after 300    # of another machine, corrected by frames
   sapwise run clustered --swing 50 --frames 600 --trace run.csv    # the number of objects grows and shrinks
   sapwise run clustered --objects 50000 --frames 100 --record clustered.npy --json
   sapwise run clustered.npy --no-learning                          # the prediction alone, on a recorded stream")]
@@ -43,7 +43,11 @@ pub(crate) struct Run {
     pub(crate) frames: Option<u32>,
     /// How often all frames are run. With one repeat, noise favours the oracle.
     #[arg(
-        long, value_name = "R", default_value_t = 6, value_parser = known::whole(1..=1000), allow_negative_numbers = true
+        long,
+        value_name = "R",
+        default_value_t = 6,
+        value_parser = known::whole(1..=1000),
+        allow_negative_numbers = true
     )]
     pub(crate) repeats: u32,
     /// Seed of the scene and of the order of turns.

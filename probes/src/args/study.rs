@@ -5,9 +5,9 @@ use std::path::PathBuf;
 
 /// Studies how hardware shapes performance: one page with figures, and tables as CSV, about any set of reports.
 ///
-/// DIR/index.html shows time over objects on the CPU and GPUs, the fields of the fastest algorithm, the regret of what is chosen on held-out
-/// hosts, the machines, and the influence of their parameters on the crossovers. Beside it are the figures as SVG, and timings.csv,
-/// crossovers.csv, regrets.csv and parameters.csv.
+/// DIR/index.html shows time over objects on the CPU and GPUs, the fields of the fastest algorithm, the regret of
+/// what is chosen on held-out hosts, the machines, and the influence of their parameters on the crossovers. Beside it
+/// are the figures as SVG, and timings.csv, crossovers.csv, regrets.csv and parameters.csv.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:

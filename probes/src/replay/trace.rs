@@ -34,8 +34,8 @@ fn csv(out: &mut dyn Write, outcome: &Outcome) -> anyhow::Result<()> {
     let times: String = order.iter().map(|&k| format!(",{}_ns", ids[k])).collect();
     writeln!(
         out,
-        "frame,objects,axis_candidates,strip_candidates,pairs,moved,algorithm,reason,predicted_ns,measured_ns,runner_up,\
-         runner_up_ns,adaptive_ns,windows_ns{times}"
+        "frame,objects,axis_candidates,strip_candidates,pairs,moved,algorithm,reason,predicted_ns,measured_ns,\
+         runner_up,runner_up_ns,adaptive_ns,windows_ns{times}"
     )?;
     // Empty when a frame was not timed, or an algorithm at it.
     let number = |ns: Option<f64>| ns.filter(|ns| ns.is_finite()).map_or(String::new(), |ns| format!("{ns}"));

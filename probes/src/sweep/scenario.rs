@@ -82,7 +82,8 @@ impl ScenarioSweep<'_> {
                 }
                 keep_racing(&mut racers, &mut standings);
                 self.remark(format!(
-                    "{scenario}: after {reached} objects only the fastest algorithms were timed, to stay within {seconds:.0} s"
+                    "{scenario}: after {reached} objects only the fastest algorithms were timed, to stay within \
+                     {seconds:.0} s"
                 ))?;
             }
             let outcome = self.point(&mut racers, objects, left.mul_f64(share(&sizes[k..])))?;

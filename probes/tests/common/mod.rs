@@ -41,8 +41,8 @@ pub(crate) fn without_adapters(command: &mut Command) -> &mut Command {
     command.env("VK_ICD_FILENAMES", "/nonexistent").env("VK_DRIVER_FILES", "/nonexistent")
 }
 
-/// The answer of `sapwise devices --json` on a machine with an adapter. Without any: `None`, with a line that says so, or a
-/// failure with `SAPWISE_REQUIRE_GPU=1`.
+/// The answer of `sapwise devices --json` on a machine with an adapter. Without any: `None`, with a line that says
+/// so, or a failure with `SAPWISE_REQUIRE_GPU=1`.
 pub(crate) fn devices_with_a_gpu(test: &str) -> Option<Value> {
     let answer: Value = serde_json::from_str(&success(sapwise().args(["devices", "--json"]))).unwrap();
     if answer["adapters"].as_array().unwrap().is_empty() {

@@ -14,7 +14,8 @@ pub(crate) struct View {
     by_motion: [f64; CURVE],
 }
 
-/// Orthonormal functions of the load: the likenesses to the first places, times the inverse of the root of their covariance.
+/// Orthonormal functions of the load: the likenesses to the first places, times the inverse of the root of their
+/// covariance.
 #[derive(Debug, Clone)]
 pub(super) struct Basis {
     pub(super) places: Arc<Places>,

@@ -5,7 +5,8 @@ use super::SIZE;
 /// Of an own part, its constant and its curve: tuning that was measured a minute ago is off by this in the next scene.
 const OWN_LN: [f64; 2] = [0.05, 0.18];
 
-/// Frames after which what was observed of it counts for less than half: in a hundred frames it may change by 2 % (a standard deviation).
+/// Frames after which what was observed of it counts for less than half: in a hundred frames it may change by 2 % (a
+/// standard deviation).
 pub(super) const OWN_FRAMES: f64 = 6000.0;
 
 /// What an algorithm has for itself.
@@ -38,7 +39,8 @@ impl Own {
     }
 }
 
-/// The share of an own part that is forgotten after so many frames. Of the exponential only the beginning: none of this is known to the last digit.
+/// The share of an own part that is forgotten after so many frames. Of the exponential only the beginning: none of
+/// this is known to the last digit.
 pub(super) fn aged(frames: u64) -> f64 {
     let aged = frames as f64 / OWN_FRAMES;
     aged / (1.0 + aged)

@@ -22,7 +22,8 @@ fn main() -> ExitCode {
         }
         Err(why) => {
             eprintln!(
-                "public-api: {why}; another version of rustdoc's JSON needs another version of the library in Cargo.toml"
+                "public-api: {why}; another version of rustdoc's JSON needs another version of the library in \
+                 Cargo.toml"
             );
             ExitCode::FAILURE
         }

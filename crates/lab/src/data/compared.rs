@@ -40,8 +40,8 @@ fn first_real_gpu(hardware: &Hardware) -> Option<&GpuHardware> {
     hardware.gpus.iter().find(|g| is_real(g))
 }
 
-/// Returns a parameter by its name in the ranges of a model. A parameter of GPUs is that of the first real one, which is a discrete GPU if
-/// the machine has any.
+/// Returns a parameter by its name in the ranges of a model. A parameter of GPUs is that of the first real one, which
+/// is a discrete GPU if the machine has any.
 #[must_use]
 pub fn figure(hardware: &Hardware, name: &str) -> Option<f64> {
     match name.strip_prefix(GPU_PREFIX) {

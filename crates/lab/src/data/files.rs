@@ -27,7 +27,8 @@ pub enum Document {
     Tuning(Box<Tuning>),
 }
 
-/// Reads a report, model or tuning file. `warn` gets a sentence when a newer version wrote keys that this one does not know.
+/// Reads a report, model or tuning file. `warn` gets a sentence when a newer version wrote keys that this one does
+/// not know.
 ///
 /// # Errors
 /// Names the file, and the line and column or the figure that is wrong.
@@ -82,8 +83,8 @@ fn without_indices(place: &str) -> String {
 /// Reads the reports in files and folders on all cores, with the name of each as [`read_report`] gives it.
 ///
 /// # Errors
-/// As [`report_files`] and [`read_report`]; when a file is given twice, which would count as two measurements; when the user asked to
-/// stop.
+/// As [`report_files`] and [`read_report`]; when a file is given twice, which would count as two measurements; when
+/// the user asked to stop.
 pub fn read_reports(paths: &[PathBuf], progress: &dyn Progress) -> anyhow::Result<Vec<(String, Report)>> {
     let files = report_files(paths)?;
     let mut seen = BTreeSet::new();
@@ -124,7 +125,8 @@ pub fn report_files(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Adds the `*.json` files of a folder and of the folders within it. Links to folders are not followed: they may lead back.
+/// Adds the `*.json` files of a folder and of the folders within it. Links to folders are not followed: they may lead
+/// back.
 fn json_files(folder: &Path, files: &mut Vec<PathBuf>) -> anyhow::Result<()> {
     let unreadable = || format!("the folder {} can't be read", folder.display());
     for entry in std::fs::read_dir(folder).with_context(unreadable)? {
@@ -139,8 +141,8 @@ fn json_files(folder: &Path, files: &mut Vec<PathBuf>) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Reads a report, with its name: that of its folder, which names the host, and of its file, as in `amd-epyc-zen3-2c/full.json`.
-/// `warn` is that of [`read_document`].
+/// Reads a report, with its name: that of its folder, which names the host, and of its file, as in
+/// `amd-epyc-zen3-2c/full.json`. `warn` is that of [`read_document`].
 ///
 /// # Errors
 /// As [`read_document`]; when the file is no report.
@@ -168,7 +170,8 @@ pub fn read_text(path: &Path) -> anyhow::Result<String> {
         bail!("{shown} is a folder; name the files in it");
     }
     let mut bytes = Vec::new();
-    // One byte beyond the limit shows that a file is too large. The length in the metadata is wrong for pipes and devices.
+    // One byte beyond the limit shows that a file is too large. The length in the metadata is wrong for pipes and
+    // devices.
     file.take(LARGEST_BYTES + 1).read_to_end(&mut bytes).with_context(|| format!("{shown} can't be read"))?;
     if bytes.len() as u64 > LARGEST_BYTES {
         bail!("{shown} is larger than {} MiB, which no file of ours is", LARGEST_BYTES >> 20);

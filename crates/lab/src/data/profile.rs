@@ -36,7 +36,8 @@ pub struct Spot {
     pub load: Load,
     /// Position in [`Profile::algorithms`], and the median over the frames in ns.
     pub medians: Vec<(u16, f64)>,
-    /// The mean over the frames of each of these, in the same order. It includes the frames in which an incremental algorithm rebuilds.
+    /// The mean over the frames of each of these, in the same order. It includes the frames in which an incremental
+    /// algorithm rebuilds.
     pub means: Vec<f64>,
 }
 
@@ -170,9 +171,9 @@ impl Profile {
     }
 }
 
-/// Identifies a host without a serial number: by its CPU model with its caches and, in a guest, by the clock in MHz that the hypervisor
-/// reports, which is the host's own. Without a hypervisor the reported clock is that of the moment and not used, so that two machines of
-/// one model count as one.
+/// Identifies a host without a serial number: by its CPU model with its caches and, in a guest, by the clock in MHz
+/// that the hypervisor reports, which is the host's own. Without a hypervisor the reported clock is that of the
+/// moment and not used, so that two machines of one model count as one.
 pub fn host(hardware: &Hardware) -> String {
     let machine = &hardware.machine;
     let clock =

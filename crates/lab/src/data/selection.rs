@@ -34,7 +34,8 @@ impl Selection {
         selection
     }
 
-    /// Reduces a report to what is trained on. Apart from [`Selection::add`] because several threads can share this work.
+    /// Reduces a report to what is trained on. Apart from [`Selection::add`] because several threads can share this
+    /// work.
     ///
     /// # Errors
     /// Why the report is left out.
@@ -95,7 +96,8 @@ fn refusal(report: &Report) -> Option<String> {
     } else if report.points.is_empty() {
         "holds no timings; measure again without `--hardware-only`"
     } else if report.label == Label::RealContended && report.provenance.threads.is_none() {
-        // Of two threads one waits for its turn on a core: 4 ms, where alone both take 50 µs. No hardware parameter shows that.
+        // Of two threads one waits for its turn on a core: 4 ms, where alone both take 50 µs. No hardware parameter
+        // shows that.
         "was measured while other programs ran on the same cores; measure again when the machine is idle"
     } else {
         return None;

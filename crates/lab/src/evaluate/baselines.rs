@@ -9,8 +9,8 @@ use sapwise::{AlgorithmId, Tuning};
 use sapwise_tune::Hardware;
 use sapwise_tune::model::GPU_PREFIX;
 
-/// Always chooses the algorithm with the least mean regret over the training profiles, each of which comes with the regret of always
-/// choosing each of its algorithms and counts the same.
+/// Always chooses the algorithm with the least mean regret over the training profiles, each of which comes with the
+/// regret of always choosing each of its algorithms and counts the same.
 pub(super) fn single_best<'a>(training: &[(&Profile, &[f64])], available: &[AlgorithmId]) -> Strategy<'a> {
     let mean = |id: &AlgorithmId| {
         let of = |(profile, always): &(&Profile, &[f64])| {
@@ -26,9 +26,9 @@ pub(super) fn single_best<'a>(training: &[(&Profile, &[f64])], available: &[Algo
 
 /// Chooses brute force on one thread up to and including `last` objects, and `above` on all threads from there on.
 ///
-/// With 64 and `grid-sap` this is nexus: brute force up to 64 colliders, then a tree, for which strips stand as the fastest in large scenes
-/// here. With 999 and `sap` it is `mujoco_warp`, whose constant of 1000 bodies separates two kinds of sweep. Both run on a GPU there, and
-/// on the CPU here, which every machine has.
+/// With 64 and `grid-sap` this is nexus: brute force up to 64 colliders, then a tree, for which strips stand as the
+/// fastest in large scenes here. With 999 and `sap` it is `mujoco_warp`, whose constant of 1000 bodies separates two
+/// kinds of sweep. Both run on a GPU there, and on the CPU here, which every machine has.
 pub(super) fn frozen<'a>(last: u32, above: &str, available: &[AlgorithmId]) -> Strategy<'a> {
     let on_cpu = |method: &'_ str| {
         let of = |id: &&AlgorithmId| id.method() == method && id.backend().class() == BackendClass::Cpu;
@@ -48,7 +48,8 @@ pub fn by_costs(costs: Vec<AlgorithmCost>, available: &[AlgorithmId]) -> Strateg
     })
 }
 
-/// Returns the available algorithm of the same method and class of processor whose number of threads or GPUs is nearest.
+/// Returns the available algorithm of the same method and class of processor whose number of threads or GPUs is
+/// nearest.
 pub(super) fn closest(id: &AlgorithmId, available: &[AlgorithmId]) -> Option<AlgorithmId> {
     let distance =
         |other: &&AlgorithmId| (f64::from(other.backend().width()) / f64::from(id.backend().width())).ln().abs();

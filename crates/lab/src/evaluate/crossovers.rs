@@ -25,9 +25,10 @@ impl MeasuredCrossovers {
         found.unwrap_or_default()
     }
 
-    /// Returns for each crossover whose algorithms have predicted costs the nearest crossing of those costs in the same direction. If they
-    /// don't cross so within the slice, it is the end beyond which they would: the upper one if the algorithm below the crossover is
-    /// predicted to be cheaper at it. The nearest number of threads stands in for one that was not predicted.
+    /// Returns for each crossover whose algorithms have predicted costs the nearest crossing of those costs in the
+    /// same direction. If they don't cross so within the slice, it is the end beyond which they would: the upper one
+    /// if the algorithm below the crossover is predicted to be cheaper at it. The nearest number of threads stands in
+    /// for one that was not predicted.
     pub(super) fn predicted(&self, costs: &[AlgorithmCost]) -> Vec<ComparedCrossover> {
         let ids: Vec<AlgorithmId> = costs.iter().map(|c| c.algorithm.clone()).collect();
         let cost = |id: &AlgorithmId| {

@@ -1,5 +1,5 @@
-//! The regression that the paper of Avril, Gouranton and Arnaldi (2011) asks for: positions of crossovers, directly from hardware parameters,
-//! and a choice by the number of objects alone.
+//! The regression that the paper of Avril, Gouranton and Arnaldi (2011) asks for: positions of crossovers, directly
+//! from hardware parameters, and a choice by the number of objects alone.
 
 use super::regret_table::Strategy;
 use crate::data::{Profile, figure};
@@ -146,8 +146,8 @@ impl Prediction {
     }
 }
 
-/// Applies the direct regression to a machine: the winner of most pairwise comparisons is chosen. `training` are profiles with the outcomes
-/// of their roles.
+/// Applies the direct regression to a machine: the winner of most pairwise comparisons is chosen. `training` are
+/// profiles with the outcomes of their roles.
 ///
 /// # Errors
 /// When linfa refuses a fit.
@@ -177,8 +177,8 @@ pub(super) fn direct<'a>(
 
 /// Predicts a pair of roles; `None` when no machine of the training has both.
 ///
-/// If most machines have a crossover, the last one of each is regressed; the machines without are not used, which is the weakness of this
-/// method. If most have none, the more frequent winner always wins.
+/// If most machines have a crossover, the last one of each is regressed; the machines without are not used, which is
+/// the weakness of this method. If most have none, the more frequent winner always wins.
 fn predict(
     training: &[(&Profile, &[RoleOutcome])],
     hardware: &Hardware,
@@ -206,8 +206,8 @@ fn predict(
     Ok(Some(Prediction::At { ln_objects: estimate(&parameters(a, b), &machines, &ln_objects, hardware)?, first_below }))
 }
 
-/// Regresses values on the logarithms of parameters and evaluates the line for a machine. Skips parameters that are missing on any machine or
-/// that depend on others, and fits the mean when there are not more rows than coefficients.
+/// Regresses values on the logarithms of parameters and evaluates the line for a machine. Skips parameters that are
+/// missing on any machine or that depend on others, and fits the mean when there are not more rows than coefficients.
 ///
 /// # Errors
 /// When linfa refuses a fit.
@@ -233,7 +233,8 @@ pub(super) struct Line {
 }
 
 impl Line {
-    /// Fits ordinary least squares to a table of shape (rows, columns); the mean when there are not more rows than coefficients.
+    /// Fits ordinary least squares to a table of shape (rows, columns); the mean when there are not more rows than
+    /// coefficients.
     ///
     /// # Errors
     /// When linfa refuses the fit.

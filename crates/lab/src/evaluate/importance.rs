@@ -1,4 +1,5 @@
-//! The influence of hardware parameters on crossovers: how much worse the direct regression fits when one parameter is permuted.
+//! The influence of hardware parameters on crossovers: how much worse the direct regression fits when one parameter
+//! is permuted.
 
 use super::direct::{Line, Role, RoleOutcome, role_outcomes};
 use crate::data::{Profile, figure};
@@ -31,8 +32,8 @@ pub struct Influence {
 /// The crossover that several profiles share.
 type Crossings<'a> = BTreeMap<(&'a Role, &'a Role), (&'a RoleOutcome, Vec<(&'a Profile, f64)>)>;
 
-/// Regresses every crossover that was measured on three hosts or more, and permutes each parameter. The crossovers of most reports
-/// come first.
+/// Regresses every crossover that was measured on three hosts or more, and permutes each parameter. The crossovers of
+/// most reports come first.
 ///
 /// # Errors
 /// When linfa refuses a fit.

@@ -20,8 +20,8 @@ pub struct Partition {
 }
 
 impl Partition {
-    /// Makes a fold of each physical machine with all its profiles; of one machine alone, of each SIMD level and each thread count; without
-    /// such restrictions, of each profile.
+    /// Makes a fold of each physical machine with all its profiles; of one machine alone, of each SIMD level and each
+    /// thread count; without such restrictions, of each profile.
     pub fn new(profiles: &[Profile]) -> Self {
         Self::of_machines(profiles, MOST_ALONE, GROUPS).unwrap_or_else(|| Self::of_restrictions(profiles))
     }

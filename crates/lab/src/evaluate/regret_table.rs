@@ -10,22 +10,24 @@ use std::collections::BTreeMap;
 /// Chooses an algorithm of a machine for a load; `None` if it knows none of them.
 pub type Strategy<'a> = Box<dyn Fn(&Load) -> Option<AlgorithmId> + 'a>;
 
-/// Assumed cost over the best for an algorithm that was not timed nearby. A hopeless algorithm is slower than this, but when time is short an
-/// algorithm leaves the sweep at three times the best already.
+/// Assumed cost over the best for an algorithm that was not timed nearby. A hopeless algorithm is slower than this,
+/// but when time is short an algorithm leaves the sweep at three times the best already.
 pub const NOT_TIMED: f64 = 10.0;
 
 /// Cells a decade of the number of objects.
 const PER_DECADE: f64 = 4.0;
 /// Rounds of taking means over algorithms and over points in turn. The values stand still after a few.
 const ROUNDS: usize = 8;
-/// Mean and standard deviation of the base-10 logarithm of the number of objects in games, an assumption: the 64 colliders at which nexus
-/// leaves brute force and the 10 000 bodies of a large scene lie two standard deviations to either side.
+/// Mean and standard deviation of the base-10 logarithm of the number of objects in games, an assumption: the 64
+/// colliders at which nexus leaves brute force and the 10 000 bodies of a large scene lie two standard deviations to
+/// either side.
 const USUAL_OBJECTS: (f64, f64) = (2.9, 0.55);
 
 /// The cost of each algorithm of a report in each cell, a quarter of a decade of a scenario, over the best.
 ///
-/// A sweep visits most often the sizes at which two algorithms lie close, where every choice costs little: counted one by one these points
-/// would flatter any strategy. And the least of several medians is too low by their errors, which averaging over a cell reduces.
+/// A sweep visits most often the sizes at which two algorithms lie close, where every choice costs little: counted
+/// one by one these points would flatter any strategy. And the least of several medians is too low by their errors,
+/// which averaging over a cell reduces.
 #[derive(Debug, Clone)]
 pub struct RegretTable {
     cells: Vec<Cell>,
@@ -142,8 +144,8 @@ impl RegretTable {
         (0..self.algorithms).map(|k| summed(cells(), |cell| cell.over_best[k] - 1.0)).collect()
     }
 
-    /// Returns the regret of choosing in each cell what is best in the same cell of another table; cells that the other one lacks don't
-    /// count.
+    /// Returns the regret of choosing in each cell what is best in the same cell of another table; cells that the
+    /// other one lacks don't count.
     pub fn by_cells_of(&self, profile: &Profile, other: &Self, of_other: &Profile) -> Regret {
         let alike = |cell: &Cell| other.cells.iter().find(|c| c.scenario == cell.scenario && c.decade == cell.decade);
         let chosen = |cell: &Cell| -> Option<f64> {
@@ -173,8 +175,9 @@ fn in_games(decade: f64) -> f64 {
     (-((decade - USUAL_OBJECTS.0) / USUAL_OBJECTS.1).powi(2) / 2.0).exp()
 }
 
-/// Returns the natural logarithm of the cost of each algorithm over the points of a cell, up to a common constant: the logarithm of a time is
-/// the sum of a part of the algorithm and a part of the point, since not every algorithm was timed at every point.
+/// Returns the natural logarithm of the cost of each algorithm over the points of a cell, up to a common constant:
+/// the logarithm of a time is the sum of a part of the algorithm and a part of the point, since not every algorithm
+/// was timed at every point.
 fn ln_costs(spots: &[Vec<(u16, f64)>], algorithms: usize) -> Vec<Option<f64>> {
     let mut costs: Vec<Option<f64>> = vec![None; algorithms];
     let mut shared = vec![0.0; spots.len()];

@@ -63,8 +63,8 @@ pub(super) fn scores(all: &[Judged], by_machine: bool) -> Vec<MethodScore> {
     score
 }
 
-/// Returns for each strategy, in the order of the first profile, the mean regret on each held-out machine, or on each profile of the only
-/// one.
+/// Returns for each strategy, in the order of the first profile, the mean regret on each held-out machine, or on each
+/// profile of the only one.
 pub(super) fn regrets_of_units(all: &[Judged], by_machine: bool) -> Vec<(&'static str, Vec<f64>)> {
     names(all).into_iter().map(|name| (name, of_units(all, name, by_machine, |r| r.mean))).collect()
 }

@@ -33,7 +33,8 @@ pub struct Validated {
     pub held_out: HeldOut,
 }
 
-/// Holds out one fold of a [`Partition`] after the other, fits to the others, and lets every strategy choose on what was held out.
+/// Holds out one fold of a [`Partition`] after the other, fits to the others, and lets every strategy choose on what
+/// was held out.
 ///
 /// Scores no strategy when there is one profile only. Each fold is a step of `progress`.
 ///
@@ -55,7 +56,8 @@ pub fn validate(
     } else {
         if !partition.by_machine {
             notes.push(
-                "validated by holding out profiles of one physical machine: this says little about machines never seen; add \
+                "validated by holding out profiles of one physical machine: this says little about machines never \
+                 seen; add \
                  reports of other machines"
                     .to_owned(),
             );
@@ -95,7 +97,8 @@ pub fn validate(
     cpu_models.dedup();
     if partition.by_machine && cpu_models.len() == 1 {
         notes.push(
-            "all hosts are of one CPU model: this says little about other models; add reports of machines with another CPU"
+            "all hosts are of one CPU model: this says little about other models; add reports of machines with \
+             another CPU"
                 .to_owned(),
         );
     }

@@ -1,4 +1,5 @@
-//! Curves over two logarithmic axes, with the fields of optimal performance behind them: Figures 4, 6 and 7 of the paper.
+//! Curves over two logarithmic axes, with the fields of optimal performance behind them: Figures 4, 6 and 7 of the
+//! paper.
 
 use super::{Area, HPos, Result, colour, grid, mesh, panels, range, svg, text};
 use plotters::prelude::*;

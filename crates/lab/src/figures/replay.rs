@@ -24,7 +24,8 @@ pub struct Replay {
 }
 
 impl Replay {
-    /// Draws the choice in black over the curves of the algorithms, and below them a strip in the colour of what was chosen.
+    /// Draws the choice in black over the curves of the algorithms, and below them a strip in the colour of what was
+    /// chosen.
     ///
     /// # Errors
     /// When plotters fails.

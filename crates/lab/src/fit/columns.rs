@@ -5,8 +5,8 @@ use ndarray::{Array1, Array2, ArrayView1, Axis};
 /// Share of its variation that a column must not share with the columns before it.
 const OWN_SHARE: f64 = 0.02;
 
-/// Leverage above which a row decides a coefficient alone: without that row its error would be over a hundred times as large (Hoaglin and
-/// Welsch, The Hat Matrix in Regression and ANOVA, 1978).
+/// Leverage above which a row decides a coefficient alone: without that row its error would be over a hundred times
+/// as large (Hoaglin and Welsch, The Hat Matrix in Regression and ANOVA, 1978).
 const ALONE: f64 = 0.99;
 
 /// Standardised columns. linfa does not warn when columns depend on each other or one row decides a coefficient.
@@ -25,8 +25,8 @@ pub(crate) struct Columns {
 }
 
 impl Columns {
-    /// Standardises `values` of shape (rows, columns) under row weights with a sum above zero. Drops each column that does not vary, varies
-    /// in one row only, or is a combination of those before it.
+    /// Standardises `values` of shape (rows, columns) under row weights with a sum above zero. Drops each column that
+    /// does not vary, varies in one row only, or is a combination of those before it.
     pub(crate) fn new(values: &Array2<f64>, weights: &[f64]) -> Self {
         let varying = Self::varying(values, weights);
         let independent: Vec<usize> = varying.base().into_iter().map(|(j, _)| j).collect();
@@ -59,7 +59,8 @@ impl Columns {
         Self { kept, centres, scales, values, shares }
     }
 
-    /// Drops, one after the other, the column that owes most to a row that decides a coefficient alone, until no row does.
+    /// Drops, one after the other, the column that owes most to a row that decides a coefficient alone, until no row
+    /// does.
     pub(crate) fn without_lone_rows(mut self) -> Self {
         loop {
             let base = self.base();
@@ -81,7 +82,8 @@ impl Columns {
         (0..self.shares.len()).map(row).collect()
     }
 
-    /// Orthonormalises the columns times the roots of the shares. Returns each with its position, without those that depend on others.
+    /// Orthonormalises the columns times the roots of the shares. Returns each with its position, without those that
+    /// depend on others.
     fn base(&self) -> Vec<(usize, Array1<f64>)> {
         let roots = Array1::from_iter(self.shares.iter().map(|s| s.sqrt()));
         let mut base: Vec<(usize, Array1<f64>)> = Vec::new();

@@ -1,5 +1,5 @@
-//! The rows of one method on one class of processor, and the cost model that is fitted to some of them. All machines, thread counts and
-//! GPUs share it.
+//! The rows of one method on one class of processor, and the cost model that is fitted to some of them. All machines,
+//! thread counts and GPUs share it.
 
 use crate::data::Profile;
 use crate::fit::designs::TrainingSet;
@@ -96,8 +96,8 @@ impl Design {
         profiles[row.profile].id(row.algorithm)
     }
 
-    /// Drops the rows on software adapters if there are others, and returns whether it dropped any. A software adapter is bound by the
-    /// CPU and shares only its interface with a GPU.
+    /// Drops the rows on software adapters if there are others, and returns whether it dropped any. A software
+    /// adapter is bound by the CPU and shares only its interface with a GPU.
     pub(super) fn leave_out_software(&self, rows: &mut Vec<usize>, profiles: &[Profile]) -> bool {
         if self.class == BackendClass::Cpu {
             return false;
@@ -119,7 +119,8 @@ impl Design {
         }
     }
 
-    /// Fits a model to some of the rows, without its helpers. `other` is the model of the method that this one falls back to.
+    /// Fits a model to some of the rows, without its helpers. `other` is the model of the method that this one falls
+    /// back to.
     ///
     /// # Errors
     /// When the residual can't be solved for.
@@ -158,7 +159,8 @@ impl Design {
         let mut gpu_kinds: Vec<GpuKind> = rows.iter().flat_map(|&k| self.gpu_kinds(k, profiles)).collect();
         gpu_kinds.sort_unstable();
         gpu_kinds.dedup();
-        // The error on a software adapter is that of its CPU, twice as large on one machine as on another: no function of the load.
+        // The error on a software adapter is that of its CPU, twice as large on one machine as on another: no
+        // function of the load.
         let residual = match gpu_kinds[..] {
             [GpuKind::Software] => Vec::new(),
             _ => load_residual::weights(places, &remainders, by_motion)?,

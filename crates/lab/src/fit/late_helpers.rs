@@ -24,8 +24,8 @@ const BOXES_PER_THREAD: [u32; 2] = [0, 1024];
 const ROUNDS: usize = 6;
 const STARTS: [f64; 2] = [0.1, 0.4];
 
-/// Returns the numbers with the least weighted sum of absolute logarithmic errors, which is robust: some frames wait for a core. `None`
-/// without timings.
+/// Returns the numbers with the least weighted sum of absolute logarithmic errors, which is robust: some frames wait
+/// for a core. `None` without timings.
 pub(crate) fn fit(called: &[Called]) -> Option<HelpersModel> {
     if called.is_empty() {
         return None;

@@ -1,4 +1,5 @@
-//! The part of a time that the physical terms leave unexplained, as a function of the load: a Gaussian process with inducing points.
+//! The part of a time that the physical terms leave unexplained, as a function of the load: a Gaussian process with
+//! inducing points.
 
 use crate::data::Profile;
 use anyhow::{Context, Result};
@@ -10,19 +11,21 @@ use sapwise_scenes::Random;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Standard deviation of a residual, and of a timing around it, as natural logarithms. Half or twice as much changes no regret noticeably.
+/// Standard deviation of a residual, and of a timing around it, as natural logarithms. Half or twice as much changes
+/// no regret noticeably.
 const DEVIATION_LN: f64 = 0.2;
 const NOISE_LN: f64 = 0.08;
 /// Time over the best of the point from which on a timing counts no less for lying further behind.
 const MOST_BEHIND: f64 = 4.0;
-/// Variance that each place has of its own, as a share. It keeps the weights of neighbouring places from growing against each other.
+/// Variance that each place has of its own, as a share. It keeps the weights of neighbouring places from growing
+/// against each other.
 const JITTER: f64 = 1e-4;
 /// Loads among which places are chosen, at most.
 const MOST_LOADS: usize = 1500;
 /// Timings that a residual is fitted to, at most.
 const MOST_ROWS: usize = 2000;
-/// A remainder beyond this many robust standard deviations, and beyond this logarithm, is cut to that: a disturbed measurement, or what no
-/// smooth residual can follow.
+/// A remainder beyond this many robust standard deviations, and beyond this logarithm, is cut to that: a disturbed
+/// measurement, or what no smooth residual can follow.
 const REACH: f64 = 3.0;
 const LEAST_REACH_LN: f64 = 0.6;
 
@@ -36,13 +39,15 @@ pub(crate) struct Remainder {
     pub(crate) behind: f64,
 }
 
-/// Returns the standard deviation of the logarithm of a timing around its residual, from its time over the best of the point.
+/// Returns the standard deviation of the logarithm of a timing around its residual, from its time over the best of
+/// the point.
 pub(crate) fn noise_ln(behind: f64) -> f64 {
     NOISE_LN * behind.min(MOST_BEHIND)
 }
 
-/// Chooses the places that tell most about the loads of the profiles, each next one where the previous ones tell least: a pivoted Cholesky
-/// decomposition of the covariance (Fine and Scheinberg, Efficient SVM training using low-rank kernel representations, 2001).
+/// Chooses the places that tell most about the loads of the profiles, each next one where the previous ones tell
+/// least: a pivoted Cholesky decomposition of the covariance (Fine and Scheinberg, Efficient SVM training using
+/// low-rank kernel representations, 2001).
 pub(crate) fn places<'a>(profiles: impl Iterator<Item = &'a Profile>, without: Option<&str>) -> Arc<Places> {
     // Profiles of one seed have the same scenes and loads.
     let mut loads: BTreeMap<(&str, u32), Load> = BTreeMap::new();

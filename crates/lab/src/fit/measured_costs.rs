@@ -17,7 +17,8 @@ use sapwise_tune::{Hardware, Model, Parameter};
 /// Points that a cost needs.
 pub(super) const FEWEST_POINTS: usize = 3;
 
-/// Returns the cost of each algorithm that was timed often enough, from the report alone, and a sentence for each other one.
+/// Returns the cost of each algorithm that was timed often enough, from the report alone, and a sentence for each
+/// other one.
 pub fn measured_costs(profile: &Profile) -> (Vec<AlgorithmCost>, Vec<String>) {
     measured_costs_over(profile, None)
 }
@@ -57,8 +58,8 @@ fn own_costs(profile: &Profile, some: &[Entry], base: Option<&Model>) -> Vec<Alg
     model.predict(&profiles[0].hardware, some).map_or_else(|_| Vec::new(), |p| p.costs)
 }
 
-/// Adds a value for each missing parameter that a model reads. Any value will do when all timings are of one machine: only its product
-/// with the fitted unit counts.
+/// Adds a value for each missing parameter that a model reads. Any value will do when all timings are of one machine:
+/// only its product with the fitted unit counts.
 fn completed(hardware: &Hardware) -> Hardware {
     let mut completed = hardware.clone();
     let add = |list: &mut Vec<Parameter>, quantity: Quantity, name: &str| {

@@ -12,8 +12,9 @@ use sapwise_tune::Model;
 
 /// Returns the tuning of the machine of a report, with steps and crossovers for `scenario`.
 ///
-/// The costs are those that `base` predicts, or of a model that is fitted to the report alone for algorithms that `base` lacks; the
-/// timings of all scenarios correct them. A crossover gets its interval from paired samples if both neighbours were timed in `scenario`.
+/// The costs are those that `base` predicts, or of a model that is fitted to the report alone for algorithms that
+/// `base` lacks; the timings of all scenarios correct them. A crossover gets its interval from paired samples if both
+/// neighbours were timed in `scenario`.
 ///
 /// # Errors
 /// When no point of `scenario`, or no algorithm, has enough timings; names the scenarios there are.
@@ -67,7 +68,8 @@ fn measure_crossovers(tuning: &mut Tuning, report: &Report) {
     }
     if measured > 0 {
         tuning.interval_basis = format!(
-            "{measured} of {}: 90 % by paired samples, from the size at which the one below is clearly cheaper to the size at which the \
+            "{measured} of {}: 90 % by paired samples, from the size at which the one below is clearly cheaper to \
+             the size at which the \
              one above is, or to the last size at which both were timed; the others: {}",
             tuning.crossovers.len(),
             tuning.interval_basis
@@ -75,10 +77,12 @@ fn measure_crossovers(tuning: &mut Tuning, report: &Report) {
     }
 }
 
-/// Returns the interval of a crossover of the cost curves, from the points of its scenario at which both neighbours were timed.
+/// Returns the interval of a crossover of the cost curves, from the points of its scenario at which both neighbours
+/// were timed.
 ///
-/// The crossover itself stays where the curves put it, which know all scenarios. If the samples cross elsewhere, the interval reaches
-/// over their crossing; if they don't cross, to the last size. `None` with fewer than three sizes, or a crossover beyond them.
+/// The crossover itself stays where the curves put it, which know all scenarios. If the samples cross elsewhere, the
+/// interval reaches over their crossing; if they don't cross, to the last size. `None` with fewer than three sizes,
+/// or a crossover beyond them.
 fn measured_interval(crossover: &Crossover, report: &Report, scenario: &str) -> Option<(f64, f64)> {
     let points = report.points.iter().filter(|p| p.scenario == scenario).filter_map(|point| {
         let samples = |id: &AlgorithmId| Some(&point.timings.iter().find(|t| t.algorithm == *id)?.samples_ns[..]);
@@ -151,7 +155,8 @@ mod tests {
         }
     }
 
-    /// A report of `brute@cpu1` and `grid-sap@cpu1` whose ratio is `(n / crossing) ^ 0.5` in `uniform`, and a crossover at 1000.
+    /// A report of `brute@cpu1` and `grid-sap@cpu1` whose ratio is `(n / crossing) ^ 0.5` in `uniform`, and a
+    /// crossover at 1000.
     fn crossed_at(crossing: f64) -> (Report, Crossover) {
         let mut report = Machine::family()[0].clone().exact().report();
         let [below, above] = ["brute@cpu1", "grid-sap@cpu1"].map(|id| id.parse::<AlgorithmId>().unwrap());

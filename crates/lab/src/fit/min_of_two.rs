@@ -9,7 +9,8 @@ const ROUNDS: usize = 4;
 const LIKE: f64 = 0.2;
 /// Cost of falling back over that of the other algorithm, when no row shows it: it looks at the boxes once more.
 const USUAL_FACTOR: f64 = 1.05;
-/// Bounds of that factor. Falling back costs no less than the other algorithm, and a row above the upper bound did not fall back.
+/// Bounds of that factor. Falling back costs no less than the other algorithm, and a row above the upper bound did
+/// not fall back.
 const FACTORS: (f64, f64) = (1.0, 1.5);
 
 /// The fit.
@@ -22,10 +23,11 @@ pub(crate) struct MinOfTwo {
 }
 
 impl MinOfTwo {
-    /// Fits the own terms to the rows that did not fall back, and a factor to the others. `other_ns` is the cost of the other algorithm in
-    /// each row.
+    /// Fits the own terms to the rows that did not fall back, and a factor to the others. `other_ns` is the cost of
+    /// the other algorithm in each row.
     ///
-    /// A sum of the terms of both would charge every frame for both. A row that fell back is a lower bound for the own terms.
+    /// A sum of the terms of both would charge every frame for both. A row that fell back is a lower bound for the
+    /// own terms.
     pub(crate) fn fit(problem: &Problem, other_ns: &[f64]) -> Self {
         let rows = problem.ns.len();
         let off = |k: usize, modelled: f64| (problem.ns[k] / modelled.max(1e-9)).ln().abs();

@@ -27,8 +27,8 @@ pub fn model(
     Ok((model, notes))
 }
 
-/// Returns the ranges of the parameters of machines, then of the GPUs that were timed. Software adapters count only if there is no real
-/// GPU: between them and one card any other would pass for known.
+/// Returns the ranges of the parameters of machines, then of the GPUs that were timed. Software adapters count only
+/// if there is no real GPU: between them and one card any other would pass for known.
 fn ranges(profiles: &[&Profile]) -> Vec<Range> {
     let machine = COMPARED
         .into_iter()

@@ -6,11 +6,12 @@ use ndarray::{Array1, Array2, ArrayView1, Axis, concatenate, s};
 /// Length outside the span of the active columns that a column of length one needs to join them.
 const INDEPENDENT: f64 = 1e-7;
 
-/// Minimises `|a x - b|` over `x >= 0` by the active-set method of Lawson and Hanson (Solving Least Squares Problems, 1974,
-/// chapter 23), for `a` of shape (rows, columns) and `b` of length rows.
+/// Minimises `|a x - b|` over `x >= 0` by the active-set method of Lawson and Hanson (Solving Least Squares Problems,
+/// 1974, chapter 23), for `a` of shape (rows, columns) and `b` of length rows.
 ///
-/// Scales columns to length one first, since terms differ by many orders of magnitude. A column that depends linearly on earlier ones in
-/// use stays at zero, so that rank-deficient input has one answer. Ends after ten changes of the active set for each column.
+/// Scales columns to length one first, since terms differ by many orders of magnitude. A column that depends linearly
+/// on earlier ones in use stays at zero, so that rank-deficient input has one answer. Ends after ten changes of the
+/// active set for each column.
 pub(crate) fn nnls(a: &Array2<f64>, b: &Array1<f64>) -> Array1<f64> {
     let columns = a.ncols();
     let lengths: Vec<f64> = a.columns().into_iter().map(|c| c.dot(&c).sqrt()).collect();
@@ -45,8 +46,9 @@ pub(crate) fn nnls(a: &Array2<f64>, b: &Array1<f64>) -> Array1<f64> {
     x
 }
 
-/// Reduces the problem to as many rows as it has columns, and one more: the triangle of a QR decomposition keeps every length and angle, so
-/// that the solutions over any columns stay. The search solves dozens of these, which would be slow over thousands of rows.
+/// Reduces the problem to as many rows as it has columns, and one more: the triangle of a QR decomposition keeps
+/// every length and angle, so that the solutions over any columns stay. The search solves dozens of these, which
+/// would be slow over thousands of rows.
 fn reduced(a: Array2<f64>, b: &Array1<f64>) -> (Array2<f64>, Array1<f64>) {
     let columns = a.ncols();
     if a.nrows() <= columns + 1 {
@@ -75,8 +77,8 @@ fn steepest(gradient: &Array1<f64>, active: &[usize], barred: &[bool], tolerance
     best
 }
 
-/// Moves `x` towards the unconstrained `solution` over the active columns, dropping those that reach zero on the way, until
-/// the solution over the remaining ones is positive. Returns whether it dropped any.
+/// Moves `x` towards the unconstrained `solution` over the active columns, dropping those that reach zero on the way,
+/// until the solution over the remaining ones is positive. Returns whether it dropped any.
 fn retreat(a: &Array2<f64>, b: &Array1<f64>, solution: Vec<f64>, active: &mut Vec<usize>, x: &mut Array1<f64>) -> bool {
     let mut z = solution;
     let mut dropped = false;
@@ -102,7 +104,8 @@ fn retreat(a: &Array2<f64>, b: &Array1<f64>, solution: Vec<f64>, active: &mut Ve
     dropped
 }
 
-/// Solves least squares over some columns by Gram-Schmidt, each column cleared twice; `None` when they are linearly dependent.
+/// Solves least squares over some columns by Gram-Schmidt, each column cleared twice; `None` when they are linearly
+/// dependent.
 fn solve(a: &Array2<f64>, b: &Array1<f64>, active: &[usize]) -> Option<Vec<f64>> {
     let count = active.len();
     let mut base: Vec<Array1<f64>> = Vec::with_capacity(count);

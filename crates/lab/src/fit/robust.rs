@@ -29,9 +29,9 @@ const SMALLEST_SPREAD: f64 = 1e-3;
 impl Problem {
     /// Returns the units of the terms, none negative; zero for a term that explains nothing.
     ///
-    /// Rows are divided by their time, so that the error is relative. A relative error is never below -1 and would pull every fit down.
-    /// Reweighting by `ln q / (q (q - 1))`, where `q` is modelled over measured time, makes the fixed point that of least squares on
-    /// `ln q`. Outliers get Huber's weight on top.
+    /// Rows are divided by their time, so that the error is relative. A relative error is never below -1 and would
+    /// pull every fit down. Reweighting by `ln q / (q (q - 1))`, where `q` is modelled over measured time, makes the
+    /// fixed point that of least squares on `ln q`. Outliers get Huber's weight on top.
     pub(crate) fn units(&self) -> Vec<f64> {
         // The first round leaves out the lower bounds.
         let mut weights: Vec<f64> =
@@ -89,8 +89,8 @@ fn to_logarithmic(q: f64) -> f64 {
     (q.ln() / (q * (q - 1.0))).min(10.0)
 }
 
-/// Returns the value at which half of the weight is reached, interpolated between the middles of neighbouring weights, so that it moves
-/// without jumps as weights change.
+/// Returns the value at which half of the weight is reached, interpolated between the middles of neighbouring
+/// weights, so that it moves without jumps as weights change.
 pub(crate) fn weighted_median(mut values: Vec<(f64, f64)>) -> Option<f64> {
     values.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let half = values.iter().map(|v| v.1).sum::<f64>() / 2.0;

@@ -23,12 +23,12 @@ pub struct Row {
     pub floor: bool,
 }
 
-/// An algorithm that left the sweep is assumed to be at least this many times slower than the best at larger sizes, or half as many times as
-/// it last was: it may gain a little on a best that outgrows its caches.
+/// An algorithm that left the sweep is assumed to be at least this many times slower than the best at larger sizes,
+/// or half as many times as it last was: it may gain a little on a best that outgrows its caches.
 const LEFT_BEHIND: f64 = 2.0;
 
-/// Returns a row for each algorithm and point, and a lower bound for each point of a scenario beyond the last at which an algorithm was
-/// timed. `position` is that of the profile.
+/// Returns a row for each algorithm and point, and a lower bound for each point of a scenario beyond the last at
+/// which an algorithm was timed. `position` is that of the profile.
 pub fn rows(profile: &Profile, position: usize) -> Vec<Row> {
     let mut rows = Vec::new();
     for (algorithm, timed) in profile.algorithms.iter().enumerate() {
@@ -50,8 +50,8 @@ pub fn rows(profile: &Profile, position: usize) -> Vec<Row> {
             ratios.entry(&spot.scenario).or_default().insert(spot.load.objects, ns / best);
         }
         let on_gpu = timed.id.backend().class() == BackendClass::Gpu;
-        // A GPU has a large fixed cost: it starts far behind and gains. One that left while it gained, because time ran out, may be
-        // ahead at larger sizes.
+        // A GPU has a large fixed cost: it starts far behind and gains. One that left while it gained, because time
+        // ran out, may be ahead at larger sizes.
         ratios.retain(|_, course| !(on_gpu && gains(course)));
         let last: BTreeMap<&str, (u32, f64)> = ratios
             .iter()

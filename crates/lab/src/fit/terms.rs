@@ -15,25 +15,28 @@ impl Component {
     }
 }
 
-/// Returns the terms that count the box pairs that a method tests. The tests of other methods are left out: they correlate with its own on
-/// one machine, and would grow differently beyond the measured sizes.
+/// Returns the terms that count the box pairs that a method tests. The tests of other methods are left out: they
+/// correlate with its own on one machine, and would grow differently beyond the measured sizes.
 fn tests(method: &str) -> &'static [Term] {
     match method {
         "brute" => &[Term::AllPairs],
         "sap" => &[Term::AxisCandidates],
         "grid-sap" => &[Term::StripCandidates],
-        // A tree tests in proportion to objects and pairs. Cached pairs are tested one by one, and found again in few frames.
+        // A tree tests in proportion to objects and pairs. Cached pairs are tested one by one, and found again in few
+        // frames.
         "bvh" | "pair-cache" => &[],
         _ => &[Term::AllPairs, Term::AxisCandidates, Term::StripCandidates],
     }
 }
 
-/// Returns the method that another one falls back to when that is cheaper: a tree, when boxes move too far for cached pairs.
+/// Returns the method that another one falls back to when that is cheaper: a tree, when boxes move too far for cached
+/// pairs.
 pub fn fallback_method(method: &str) -> Option<&'static str> {
     (method == "pair-cache").then_some("bvh")
 }
 
-/// Returns whether a method sorts the boxes in every frame. `pair-cache` sorts them in few, or when the tree takes over.
+/// Returns whether a method sorts the boxes in every frame. `pair-cache` sorts them in few, or when the tree takes
+/// over.
 fn sorts(method: &str) -> bool {
     !matches!(method, "brute" | "pair-cache")
 }
@@ -45,8 +48,8 @@ pub(crate) fn is_incremental(method: &str) -> bool {
 
 /// Returns the components of the time of a method, on one thread or on any number of GPUs.
 ///
-/// Of components that can't be distinguished the first one is used. So the order matters when all machines are alike: lanes before cycles,
-/// the work of the GPU before that of the CPU for it.
+/// Of components that can't be distinguished the first one is used. So the order matters when all machines are alike:
+/// lanes before cycles, the work of the GPU before that of the CPU for it.
 pub fn components(method: &str, class: BackendClass) -> Vec<Component> {
     match class {
         BackendClass::Cpu => on_cpu(method).into_iter().map(|(term, scale)| Component::of(term, scale)).collect(),
@@ -75,10 +78,11 @@ fn on_cpu(method: &str) -> Vec<(Term, Scale)> {
 const BOX: f64 = 24.0;
 const PAIR: f64 = 8.0;
 
-/// Returns what a frame of a method does on a GPU: dispatches that wait for each other, and the bytes that its kernels read and write
-/// for each box and for each pair.
+/// Returns what a frame of a method does on a GPU: dispatches that wait for each other, and the bytes that its
+/// kernels read and write for each box and for each pair.
 ///
-/// Counted from the kernels, for 100 000 evenly spread boxes: each element of a buffer once for each kernel that touches it.
+/// Counted from the kernels, for 100 000 evenly spread boxes: each element of a buffer once for each kernel that
+/// touches it.
 pub(crate) fn gpu_counts(method: &str) -> Option<(f64, f64, f64)> {
     match method {
         "sap" => Some((14.0, 204.25, 36.1345)),
@@ -88,8 +92,9 @@ pub(crate) fn gpu_counts(method: &str) -> Option<(f64, f64, f64)> {
     }
 }
 
-/// Dispatches and bytes are counted; a fit finds only by how much a dispatch or a byte of the method is more expensive than one that a
-/// hardware parameter was measured with. A card that was not measured is assumed to have the same ratios.
+/// Dispatches and bytes are counted; a fit finds only by how much a dispatch or a byte of the method is more
+/// expensive than one that a hardware parameter was measured with. A card that was not measured is assumed to have
+/// the same ratios.
 fn on_gpus(method: &str) -> Vec<Component> {
     use {Scale::*, Term::*};
     // Brute force is not counted: it reads each box once.

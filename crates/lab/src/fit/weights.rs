@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 
 /// Returns the weight of each row.
 ///
-/// Every physical machine counts the same, however many profiles it has: no parameter shows what is special about a machine, and twenty
-/// of its profiles would pass that off as common to all. Within a machine every profile counts the same, and within a profile every octave
-/// of the number of objects. A row counts less the further it lies behind the best of its point: nobody chooses the algorithm there.
+/// Every physical machine counts the same, however many profiles it has: no parameter shows what is special about a
+/// machine, and twenty of its profiles would pass that off as common to all. Within a machine every profile counts
+/// the same, and within a profile every octave of the number of objects. A row counts less the further it lies behind
+/// the best of its point: nobody chooses the algorithm there.
 pub(super) fn weights(rows: &[&Row], machines: &[usize]) -> Vec<f64> {
     let octave = |row: &Row| (row.profile, row.load.objects.ilog2());
     let mut counts: BTreeMap<(usize, u32), f64> = BTreeMap::new();

@@ -23,7 +23,8 @@ pub struct Report {
     pub hardware: Hardware,
     /// The algorithms that were timed.
     pub algorithms: Vec<Timed>,
-    /// What was timed where, round after round of each scenario, the sizes of a round ascending. Empty with `--hardware-only`.
+    /// What was timed where, round after round of each scenario, the sizes of a round ascending. Empty with
+    /// `--hardware-only`.
     pub points: Vec<Point>,
     /// Whether the measurement was cut short, and what went wrong. Empty when all went well.
     pub remarks: Vec<String>,
@@ -151,14 +152,16 @@ pub struct Point {
     pub load: Load,
     /// Pairs in the last frame.
     pub pairs: u64,
-    /// [`Pairs::fingerprint`](sapwise::Pairs::fingerprint) of the last frame, equal for every algorithm, as 16 hex digits.
+    /// [`Pairs::fingerprint`](sapwise::Pairs::fingerprint) of the last frame, equal for every algorithm, as 16 hex
+    /// digits.
     pub fingerprint: String,
     /// Highest share of the CPU, 0 to 1, that other programs took meanwhile. `None` when the system does not report it.
     pub foreign_load: Option<f64>,
     /// Frames that were dropped because of foreign load.
     pub spoiled: u32,
-    /// [`ParameterId::CoreToCoreNs`](sapwise_tune::ParameterId::CoreToCoreNs) before and after the samples. It changes when a hypervisor
-    /// moves the cores of a guest, and with it the speed-up of several threads. Absent on one core.
+    /// [`ParameterId::CoreToCoreNs`](sapwise_tune::ParameterId::CoreToCoreNs) before and after the samples. It
+    /// changes when a hypervisor moves the cores of a guest, and with it the speed-up of several threads. Absent on
+    /// one core.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub core_to_core_ns: Option<[f64; 2]>,
     /// One entry for each algorithm that had not left the sweep.
@@ -171,8 +174,8 @@ pub struct Point {
 pub struct Timing {
     /// The algorithm.
     pub algorithm: AlgorithmId,
-    /// Wall clock of each frame from boxes in memory to pairs in memory. The k-th sample of every algorithm at a point is the same
-    /// frame. An algorithm that was clearly beaten has fewer samples: it stopped early.
+    /// Wall clock of each frame from boxes in memory to pairs in memory. The k-th sample of every algorithm at a
+    /// point is the same frame. An algorithm that was clearly beaten has fewer samples: it stopped early.
     pub samples_ns: Vec<u64>,
     /// Why there are no samples. Absent when there are any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -212,8 +215,8 @@ impl Report {
         remark.starts_with("unfinished") || remark.starts_with("interrupted")
     }
 
-    /// Returns the median share of the CPU, 0 to 1, that other programs took, over the points or, without points, over the parameters.
-    /// `None` when the system does not report it.
+    /// Returns the median share of the CPU, 0 to 1, that other programs took, over the points or, without points,
+    /// over the parameters. `None` when the system does not report it.
     #[must_use]
     pub fn foreign_load(&self) -> Option<f64> {
         let mut loads: Vec<f64> = self.points.iter().filter_map(|p| p.foreign_load).collect();

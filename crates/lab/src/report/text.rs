@@ -14,8 +14,8 @@ pub fn read(text: &str) -> Result<Read<Report>, Error> {
     FORMAT.read::<Report>(text)?.checked(Report::defect)
 }
 
-/// Writes a report: one key a line, one point a line, and the raw samples of a parameter on one line, so that a full sweep stays
-/// readable and below a megabyte.
+/// Writes a report: one key a line, one point a line, and the raw samples of a parameter on one line, so that a full
+/// sweep stays readable and below a megabyte.
 ///
 /// # Errors
 /// When a number can't be written.

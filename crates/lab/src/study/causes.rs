@@ -25,7 +25,8 @@ pub(super) fn section(material: &Material, page: &mut Page, files: &mut Vec<(&st
     match &hosts[..] {
         [reference, others @ ..] if !others.is_empty() => {
             let svg = cpus(reference, others).svg()?;
-            let caption = "Figures 10 and 11 for CPUs: parameters over those of the reference, and how many times as fast each method is on \
+            let caption = "Figures 10 and 11 for CPUs: parameters over those of the reference, and how many times as \
+                fast each method is on \
                            one thread, geometric mean over shared frames of 1000 objects or more.";
             page.figure("figure-10-cpus.svg", &svg, caption);
             files.push(("figure-10-cpus.svg", svg));
@@ -69,8 +70,10 @@ pub(super) fn section(material: &Material, page: &mut Page, files: &mut Vec<(&st
         rows: found.iter().map(row).collect(),
     };
     let svg = matrix.svg()?;
-    let caption = "Crossovers regressed on the logarithms of parameters by least squares. In parentheses the mean error of the fit; in the cells \
-                   how much it rises when the values of one parameter are exchanged between reports, the mean over 30 permutations. An empty \
+    let caption = "Crossovers regressed on the logarithms of parameters by least squares. In parentheses the mean \
+        error of the fit; in the cells \
+                   how much it rises when the values of one parameter are exchanged between reports, the mean over \
+                   30 permutations. An empty \
                    cell: the regression does not read that parameter.";
     page.figure("figure-11-influence.svg", &svg, caption);
     files.push(("figure-11-influence.svg", svg));

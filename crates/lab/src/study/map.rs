@@ -35,7 +35,8 @@ pub(super) fn section(material: &Material, page: &mut Page, files: &mut Vec<(&st
                 None => "Nothing is predicted: that takes another report.".to_owned(),
             };
             let caption = format!(
-                "The fastest algorithm for evenly spread boxes that move as in the scenario uniform. Measured: by curves fitted to the \
+                "The fastest algorithm for evenly spread boxes that move as in the scenario uniform. Measured: by \
+                 curves fitted to the \
                  timings of {}; points are the frames that were timed, of all scenarios. {predicted}",
                 title(profile)
             );
@@ -46,7 +47,8 @@ pub(super) fn section(material: &Material, page: &mut Page, files: &mut Vec<(&st
     Ok(())
 }
 
-/// The map of a profile, and what was held out of the training of its predicted side, which a single report doesn't have.
+/// The map of a profile, and what was held out of the training of its predicted side, which a single report doesn't
+/// have.
 fn map(material: &Material, profile: &Profile) -> Result<(FieldMap, Option<String>)> {
     let tuning = material.profiles.iter().zip(&material.tunings).find(|(p, _)| std::ptr::eq(*p, profile));
     let measured = tuning.and_then(|(_, tuning)| tuning.as_ref()).map(|t| &t.costs[..]).unwrap_or_default();
@@ -106,14 +108,15 @@ fn map(material: &Material, profile: &Profile) -> Result<(FieldMap, Option<Strin
 fn spread_evenly(objects: f64, pairs_of_object: f64, moved: f64) -> Load {
     let objects = objects.round().max(2.0) as u32;
     let few = objects.min(MOST_BOXES);
-    // Two cubes overlap when their middles differ by at most one on each axis: 8 of the volume, half as many pairs as neighbours.
+    // Two cubes overlap when their middles differ by at most one on each axis: 8 of the volume, half as many pairs as
+    // neighbours.
     let edge = (4.0 * f64::from(few) / pairs_of_object).cbrt() as f32;
     let mut random = Random::named(SEED, &["map"]);
     let mut middle = || [(); 3].map(|()| random.uniform() as f32 * edge);
     let boxes: Vec<Aabb> = (0..few).map(|_| Aabb::cube(middle(), 0.5)).collect();
     let load = Load::estimate(&boxes, Some(f64::from(few) * pairs_of_object), Some(moved));
-    // The world grows with its objects: pairs and strips grow as they do, and an axis with the power 5/3, since each object shares it with
-    // as many as its cross-section holds.
+    // The world grows with its objects: pairs and strips grow as they do, and an axis with the power 5/3, since each
+    // object shares it with as many as its cross-section holds.
     let growth = f64::from(objects) / f64::from(few);
     Load::of_objects(objects)
         .with_candidates(load.axis_candidates * growth.powf(5.0 / 3.0), load.strip_candidates * growth)

@@ -1,4 +1,5 @@
-//! The study of Avril, Gouranton and Arnaldi (ISVRI 2011) from any set of reports: one page with figures, and tables as CSV.
+//! The study of Avril, Gouranton and Arnaldi (ISVRI 2011) from any set of reports: one page with figures, and tables
+//! as CSV.
 
 mod causes;
 mod csv;
@@ -59,8 +60,8 @@ struct Material {
     notes: Vec<String>,
 }
 
-/// Reads reports, trains and validates a model on them, and writes the page, its figures and the tables into a folder, which is made when
-/// it is missing. Files of an earlier study are replaced.
+/// Reads reports, trains and validates a model on them, and writes the page, its figures and the tables into a
+/// folder, which is made when it is missing. Files of an earlier study are replaced.
 ///
 /// # Errors
 /// When a report can't be read, the folder holds something else or takes no file, and when the user asked to stop.
@@ -142,7 +143,8 @@ impl Material {
 
     fn lead(&self) -> String {
         format!(
-            "From {}: the timings of {} on {}. Sapwise {}. All tables are beside this page as CSV: timings.csv, crossovers.csv, regrets.csv \
+            "From {}: the timings of {} on {}. Sapwise {}. All tables are beside this page as CSV: timings.csv, \
+             crossovers.csv, regrets.csv \
              and parameters.csv.",
             count(self.reports.len(), "report"),
             count(self.profiles.len(), "report"),
@@ -190,7 +192,8 @@ fn regrets(material: &Material, page: &mut Page) {
         String::new()
     });
     page.text(
-        "Regret is the time of what is chosen over that of the best choice, less one. In parentheses it is weighted by the numbers of \
+        "Regret is the time of what is chosen over that of the best choice, less one. In parentheses it is weighted \
+         by the numbers of \
          objects that games are assumed to have, log-normal around 800.",
     );
     page.table(what.trim(), &rows.into_inner());

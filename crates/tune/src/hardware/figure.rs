@@ -29,8 +29,9 @@ pub struct Parameter {
     /// How the value follows from the samples.
     #[serde(default, skip_serializing_if = "Statistic::is_median")]
     pub statistic: Statistic,
-    /// The kept samples in order of measurement, in the unit of the name, to six significant digits. Value, dispersion and number
-    /// of samples follow from them. Empty if nothing was measured, if the value comes from a fit, and in old reports.
+    /// The kept samples in order of measurement, in the unit of the name, to six significant digits. Value,
+    /// dispersion and number of samples follow from them. Empty if nothing was measured, if the value comes from a
+    /// fit, and in old reports.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub raw: Vec<f64>,
 }

@@ -15,7 +15,8 @@ pub struct Quantity {
     pub read_by_model: bool,
 }
 
-/// Lowest and highest plausible value. The bounds are wide: they find wrong units, while the ranges of a model find unusual machines.
+/// Lowest and highest plausible value. The bounds are wide: they find wrong units, while the ranges of a model find
+/// unusual machines.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Bounds {
@@ -150,7 +151,8 @@ impl ParameterId {
 parameters! {
     /// A parameter of a GPU or of a group of GPUs. An upload goes from the CPU to the GPU, a download back.
     GpuParameterId("parameter of a GPU") {
-        /// Upload of 33 554 432 bytes: copy into mapped memory, copy by the GPU, wait. The paper's CPU to GPU bandwidth.
+        /// Upload of 33 554 432 bytes: copy into mapped memory, copy by the GPU, wait. The paper's CPU to GPU
+        /// bandwidth.
         UploadGbPerS = "upload_gb_per_s", within(0.01, 2000.0), true;
         /// Slope of a line through uploads from 4 KiB to 64 MiB.
         UploadRateGbPerS = "upload_rate_gb_per_s", within(0.01, 2000.0), true;
@@ -160,7 +162,8 @@ parameters! {
         DownloadRateGbPerS = "download_rate_gb_per_s", within(0.01, 2000.0), true;
         /// Bandwidth of a kernel that reads the GPU's memory, over a working set beyond its caches.
         ReadGbPerS = "read_gb_per_s", within(0.1, 100_000.0), true;
-        /// Bandwidth of the copy command within the GPU's memory, reads and writes counted. The paper's internal bandwidth.
+        /// Bandwidth of the copy command within the GPU's memory, reads and writes counted. The paper's internal
+        /// bandwidth.
         CopyGbPerS = "copy_gb_per_s", within(0.1, 100_000.0), true;
         /// Memory of the GPU.
         MemoryBytes = "memory_bytes", ANY, false;

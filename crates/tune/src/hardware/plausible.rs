@@ -8,7 +8,8 @@ impl Bounds {
         let Self { least, most } = self;
         let value = value.filter(|v| !(least..=most).contains(v))?;
         Some(HardwareError(format!(
-            "the parameter {name}{of} is {value}, and no machine lies outside {least} to {most}; check its unit, or measure it with \
+            "the parameter {name}{of} is {value}, and no machine lies outside {least} to {most}; check its unit, or \
+             measure it with \
              `sapwise probe --hardware-only`"
         )))
     }
@@ -25,7 +26,8 @@ impl Hardware {
         id.quantity().bounds?.check(id.as_str(), "", self.value(id))
     }
 
-    /// Makes each implausible parameter of the machine missing, without its GPUs, and returns why. A busy machine yields such values.
+    /// Makes each implausible parameter of the machine missing, without its GPUs, and returns why. A busy machine
+    /// yields such values.
     #[cfg(feature = "measure")]
     pub(crate) fn drop_implausible(&mut self) -> Vec<HardwareError> {
         let mut dropped = Vec::new();

@@ -11,7 +11,8 @@ named! {
         /// Median of all samples.
         #[default]
         Median = "median",
-        /// Of a rate: median of the samples at or above the upper quartile. For loops that an interruption can only make slower.
+        /// Of a rate: median of the samples at or above the upper quartile. For loops that an interruption can only
+        /// make slower.
         FastestQuarterMedian = "fastest_quarter_median",
         /// A fit through several values a sample, which are not kept. Only in reports of earlier versions.
         Fit = "fit",

@@ -1,6 +1,7 @@
 //! Load latencies over growing working sets, and the cache sizes that the system reports.
 //!
-//! The sizes alone are not enough: a virtual machine reported a last-level cache of 105 MB and showed no plateau for it.
+//! The sizes alone are not enough: a virtual machine reported a last-level cache of 105 MB and showed no plateau for
+//! it.
 
 use std::cell::Cell;
 use std::hint::black_box;
@@ -10,7 +11,8 @@ use super::{Options, cache_sizes, filled, memory};
 use crate::hardware::{Parameter, ParameterId};
 use sapwise::internals::splitmix;
 
-/// Sets of up to so many bytes are walked once, untimed, before their samples. A lap of a larger one takes longer than its samples.
+/// Sets of up to so many bytes are walked once, untimed, before their samples. A lap of a larger one takes longer
+/// than its samples.
 const WALKED_BYTES: usize = 64 << 20;
 
 /// The largest working set of a brief run.
@@ -71,8 +73,8 @@ struct Line<'a> {
     next: Cell<Option<&'a Line<'a>>>,
 }
 
-/// Links the lines to one random cycle, by Sattolo's algorithm. A plain shuffle would fall apart into shorter cycles, and a walk would
-/// stay in a cache that holds one of them.
+/// Links the lines to one random cycle, by Sattolo's algorithm. A plain shuffle would fall apart into shorter cycles,
+/// and a walk would stay in a cache that holds one of them.
 fn link<'a>(lines: &'a [Line<'a>]) {
     let mut order: Vec<usize> = (0..lines.len()).collect();
     let mut state = 0;

@@ -9,8 +9,8 @@ use super::Options;
 use super::samples::Plan;
 use crate::hardware::{Parameter, ParameterId, Statistic};
 
-/// Links of one timed chain: 1.4 ms at 4 GHz, short enough to fit between two interruptions, and long enough that a report holds a few
-/// hundred samples at most.
+/// Links of one timed chain: 1.4 ms at 4 GHz, short enough to fit between two interruptions, and long enough that a
+/// report holds a few hundred samples at most.
 const LINKS: u64 = 5_600_000;
 
 /// Additions that the assembly repeats before it returns to the loop, whose own counter runs beside the chain.
@@ -18,9 +18,11 @@ const UNROLLED: u64 = 64;
 
 pub(super) fn measure(options: &Options) -> Result<Vec<Parameter>, String> {
     let method = format!(
-        "chain of {LINKS} dependent register additions on one thread; value is the median of the fastest quarter of the chains, dispersion is of all"
+        "chain of {LINKS} dependent register additions on one thread; value is the median of the fastest quarter of \
+         the chains, dispersion is of all"
     );
-    // An interruption can only make a chain slower, so the fast ones show the clock. The best of hundreds would be a short boost.
+    // An interruption can only make a chain slower, so the fast ones show the clock. The best of hundreds would be a
+    // short boost.
     let plan = Plan { statistic: Statistic::FastestQuarterMedian, ..options.plan(100, 450) };
     let measured = plan.measure([(ParameterId::ClockMeasuredGhz, method)], || Ok([chain_ghz()]));
     measured.map(|measured| std::iter::once(reported()).chain(measured).collect())
@@ -28,8 +30,8 @@ pub(super) fn measure(options: &Options) -> Result<Vec<Parameter>, String> {
 
 /// Clock from one addition a cycle.
 ///
-/// The addend is a register: cores such as Golden Cove eliminate the addition of an immediate at rename, which would show five times
-/// the clock. In assembly, because the compiler would replace the chain by a multiplication.
+/// The addend is a register: cores such as Golden Cove eliminate the addition of an immediate at rename, which would
+/// show five times the clock. In assembly, because the compiler would replace the chain by a multiplication.
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 fn chain_ghz() -> f64 {
     use std::arch::asm;
@@ -38,9 +40,13 @@ fn chain_ghz() -> f64 {
     let start = Instant::now();
     for _ in 0..LINKS / UNROLLED {
         #[cfg(target_arch = "x86_64")]
-        // SAFETY: adds one register to another, 64 times; touches neither memory nor the stack, and the flags are not preserved.
+        // SAFETY: adds one register to another, 64 times; touches neither memory nor the stack, and the flags are not
+        // preserved.
         unsafe {
-            asm!(".rept 64", "add {sum}, {addend}", ".endr", sum = inout(reg) sum, addend = in(reg) addend, options(nomem, nostack));
+            asm!(
+                ".rept 64", "add {sum}, {addend}", ".endr",
+                sum = inout(reg) sum, addend = in(reg) addend, options(nomem, nostack)
+            );
         }
         #[cfg(target_arch = "aarch64")]
         // SAFETY: adds one register to another, 64 times; touches neither memory, the stack nor the flags.

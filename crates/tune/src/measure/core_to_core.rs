@@ -1,8 +1,9 @@
 //! How long it takes a core to see what another core wrote.
 //!
-//! The hypervisor of one machine moved its two virtual cores between one group of cores that shares a cache (23 ns) and two groups
-//! (175 ns), for seconds or minutes. The bandwidth of both was 88 GB/s or 52 GB/s accordingly, and two threads gained 1.5× on small
-//! work in one place and lost a third in the other. Without this parameter the difference looks like noise.
+//! The hypervisor of one machine moved its two virtual cores between one group of cores that shares a cache (23 ns)
+//! and two groups (175 ns), for seconds or minutes. The bandwidth of both was 88 GB/s or 52 GB/s accordingly, and two
+//! threads gained 1.5× on small work in one place and lost a third in the other. Without this parameter the
+//! difference looks like noise.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
@@ -28,17 +29,18 @@ pub(super) fn measure(options: &Options) -> Result<Vec<Parameter>, String> {
         return Err("one usable core, or threads can't be bound to cores here".to_owned());
     }
     let method = format!(
-        "one way of an exchange through one word between threads bound to two cores; median over {} pairs of the first core with others",
+        "one way of an exchange through one word between threads bound to two cores; median over {} pairs of the \
+         first core with others",
         pairs.len()
     );
     options.plan(15, 300).measure([(ParameterId::CoreToCoreNs, method)], || Ok([median_of(&pairs)]))
 }
 
-/// Measures [`ParameterId::CoreToCoreNs`] once, over the first core with the second and the last, as the best of three so that a
-/// preempted thread does not count. Takes 1 to 2 ms, at most 60 ms if other programs hold a core.
+/// Measures [`ParameterId::CoreToCoreNs`] once, over the first core with the second and the last, as the best of
+/// three so that a preempted thread does not count. Takes 1 to 2 ms, at most 60 ms if other programs hold a core.
 ///
-/// Shows during a long measurement whether the machine stayed the same. `None` on one core, and if threads can't be bound or don't
-/// run.
+/// Shows during a long measurement whether the machine stayed the same. `None` on one core, and if threads can't be
+/// bound or don't run.
 #[must_use]
 pub fn core_to_core_ns(options: &Options) -> Option<f64> {
     let all = pairs(options.usable_cores());

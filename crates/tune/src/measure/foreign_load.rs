@@ -1,7 +1,7 @@
 //! The share of the CPU that other programs take.
 //!
-//! On a machine whose second core was taken by another program, a fork and join measured 40 µs instead of 22 µs, and triad 8 GB/s
-//! instead of 22 GB/s. Such values look like a slower machine.
+//! On a machine whose second core was taken by another program, a fork and join measured 40 µs instead of 22 µs, and
+//! triad 8 GB/s instead of 22 GB/s. Such values look like a slower machine.
 
 use std::time::{Duration, Instant};
 
@@ -83,8 +83,8 @@ impl Counters {
 
     /// Share of the CPU, 0 to 1, that other programs and the hypervisor took between these counters and later ones.
     ///
-    /// Busy time is the wall clock without idle time: the kernel keeps idle time to the nanosecond but samples user and system time
-    /// once a tick, which misjudges a program that sleeps and wakes within one.
+    /// Busy time is the wall clock without idle time: the kernel keeps idle time to the nanosecond but samples user
+    /// and system time once a tick, which misjudges a program that sleeps and wakes within one.
     fn foreign_share(self, later: Self, elapsed: Duration) -> f64 {
         let capacity = elapsed.as_secs_f64() * TICKS_PER_SECOND * f64::from(self.cpus.max(1));
         let known = later.idle.saturating_sub(self.idle) + later.own.saturating_sub(self.own);

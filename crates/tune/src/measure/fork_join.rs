@@ -1,7 +1,7 @@
 //! What it costs to split work over all usable cores and wait for it.
 //!
-//! Measured through the same phase by which the algorithms on several cores split their work: the calling thread works, and helpers
-//! join in, each bound to a core of its own. The bodies have a known length, which is subtracted.
+//! Measured through the same phase by which the algorithms on several cores split their work: the calling thread
+//! works, and helpers join in, each bound to a core of its own. The bodies have a known length, which is subtracted.
 
 use std::time::{Duration, Instant};
 
@@ -15,8 +15,8 @@ const SHORT: Duration = Duration::from_micros(20);
 
 /// Body of a cold phase, and of the phases that wake the helpers.
 ///
-/// On one machine a virtual CPU took longer than 20 µs to wake. With bodies that short the caller had run them all before the helper
-/// was awake, and the phase measured 20 µs instead of a start.
+/// On one machine a virtual CPU took longer than 20 µs to wake. With bodies that short the caller had run them all
+/// before the helper was awake, and the phase measured 20 µs instead of a start.
 const LONG: Duration = Duration::from_micros(300);
 
 /// Idle time of the helpers before a cold phase. By then they sleep.
@@ -32,7 +32,8 @@ pub(super) fn measure(options: &Options) -> Result<Vec<Parameter>, String> {
     }
     let workers = workers(threads)?;
     let warm = format!(
-        "phase of {threads} bodies of 20 µs, one on the calling thread and the others on {} awake helpers, minus one body; a sample is the \
+        "phase of {threads} bodies of 20 µs, one on the calling thread and the others on {} awake helpers, minus one \
+         body; a sample is the \
          median of {PHASES}",
         threads - 1
     );
@@ -64,8 +65,9 @@ fn phase_ns(workers: &Workers, body: Duration) -> f64 {
 
 /// Runs phases until the bodies ran at the same time, so that every helper is awake and on its own core.
 ///
-/// The kernel of one virtual machine kept a woken thread on the waker's core for up to 3 ms although the other core was idle, and
-/// every other sample was the serial time. Gives up after a few phases: the samples then show what the machine does.
+/// The kernel of one virtual machine kept a woken thread on the waker's core for up to 3 ms although the other core
+/// was idle, and every other sample was the serial time. Gives up after a few phases: the samples then show what the
+/// machine does.
 fn wake(workers: &Workers) {
     let enough = (LONG + LONG / 2).as_nanos() as f64;
     let _ = (0..16).any(|_| phase_ns(workers, LONG) < enough);

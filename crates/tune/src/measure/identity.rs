@@ -14,7 +14,8 @@ struct Cpu {
     hypervisor: Option<String>,
 }
 
-/// Returns the identity of this machine, with a hash of CPU vendor, family, model, stepping and last-level cache as its id.
+/// Returns the identity of this machine, with a hash of CPU vendor, family, model, stepping and last-level cache as
+/// its id.
 #[must_use]
 pub fn machine() -> Machine {
     let cpu = Cpu::of_this_machine();

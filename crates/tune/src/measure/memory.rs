@@ -12,7 +12,8 @@ use super::{Options, cache_sizes, filled, missing, pool};
 use crate::hardware::{Parameter, ParameterId};
 use sapwise::algorithm::SimdLevel;
 
-/// Bytes that STREAM counts for one element of triad: two read, one written, without the line that is fetched before the write.
+/// Bytes that STREAM counts for one element of triad: two read, one written, without the line that is fetched before
+/// the write.
 const BYTES_PER_ELEMENT: u64 = 24;
 
 /// Largest array. The first touch of a larger one would take longer than the measurement.
@@ -51,7 +52,8 @@ pub(super) fn total_bytes() -> Option<u64> {
     Some(system.total_memory().min(limit)).filter(|&bytes| bytes > 0)
 }
 
-/// Bytes of one array: four times the sum of the last-level caches, as STREAM asks, within a bound and an eighth of memory for three.
+/// Bytes of one array: four times the sum of the last-level caches, as STREAM asks, within a bound and an eighth of
+/// memory for three.
 fn array_bytes(llc: u64, memory: u64, largest: u64) -> u64 {
     llc.saturating_mul(4).min(largest).min(memory / 24)
 }
@@ -74,7 +76,8 @@ fn triad(options: &Options) -> Result<Vec<Parameter>, String> {
     let method = |threads: usize| {
         let (plural, mib) = (if threads == 1 { "" } else { "s" }, bytes >> 20);
         format!(
-            "STREAM triad on {threads} thread{plural}, three arrays of {mib} MiB; value is the median, STREAM quotes the best"
+            "STREAM triad on {threads} thread{plural}, three arrays of {mib} MiB; value is the median, STREAM quotes \
+             the best"
         )
     };
     let plan = options.plan(9, 1150);
@@ -125,8 +128,8 @@ impl Arrays {
 
     /// GB/s of all threads of the pool.
     ///
-    /// Each thread takes chunks of its own part, then helps the others: with one fixed part a thread the slowest thread decides, and
-    /// one machine showed 52 GB/s instead of 73 GB/s.
+    /// Each thread takes chunks of its own part, then helps the others: with one fixed part a thread the slowest
+    /// thread decides, and one machine showed 52 GB/s instead of 73 GB/s.
     fn triad_on_all(&mut self, pool: &ThreadPool) -> f64 {
         let start = Instant::now();
         let queues: Vec<_> = self
@@ -155,8 +158,8 @@ impl Arrays {
 
 /// One pass of a = b + s * c with the widest vectors in use.
 ///
-/// x86-64 defaults to 128-bit vectors: with them one thread reached 0.90 of the bandwidth of a C program that was compiled for the
-/// machine, and 1.02 of it with 512-bit ones.
+/// x86-64 defaults to 128-bit vectors: with them one thread reached 0.90 of the bandwidth of a C program that was
+/// compiled for the machine, and 1.02 of it with 512-bit ones.
 fn pass(a: &mut [f64], b: &[f64], c: &[f64]) {
     #[cfg(target_arch = "x86_64")]
     match SimdLevel::in_use() {

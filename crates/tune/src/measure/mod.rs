@@ -1,8 +1,8 @@
 //! Measures the hardware parameters of this machine in process, in about three seconds on two cores.
 //!
-//! One file measures one family of parameters. Samples are taken in windows. A window in which other programs took more than 5 %
-//! of the CPU is discarded and repeated while time is left; foreign load is known on Linux only. Every loop has a time limit, so a
-//! slow or loaded machine takes fewer samples instead of more time.
+//! One file measures one family of parameters. Samples are taken in windows. A window in which other programs took
+//! more than 5 % of the CPU is discarded and repeated while time is left; foreign load is known on Linux only. Every
+//! loop has a time limit, so a slow or loaded machine takes fewer samples instead of more time.
 
 mod cache_sizes;
 mod caches;
@@ -86,8 +86,9 @@ pub struct Options {
     pub threads: Option<u32>,
     /// Stops after a few samples of small working sets. For tests: the values are not fit for a report.
     pub brief: bool,
-    /// Upper bound on the time, give or take one sample, of the function that is called: for one family, for all of them, or for one
-    /// GPU. What no cost model reads is left out if it takes time. `None` takes as long as a report needs.
+    /// Upper bound on the time, give or take one sample, of the function that is called: for one family, for all of
+    /// them, or for one GPU. What no cost model reads is left out if it takes time. `None` takes as long as a report
+    /// needs.
     pub limit: Option<Duration>,
     /// Ends the measurement with the current sample once it is set.
     pub(crate) stop: Option<Arc<AtomicBool>>,
@@ -139,7 +140,8 @@ impl Options {
 
 /// Measures one family. Returns each of [`Family::parameters`] once: measured, reported or missing with a reason.
 ///
-/// A caller that wants to survive a crash runs each family in a child process and combines the answers with [`assemble`].
+/// A caller that wants to survive a crash runs each family in a child process and combines the answers with
+/// [`assemble`].
 #[must_use]
 pub fn family(family: Family, options: &Options) -> Vec<Parameter> {
     let measured = match family {
@@ -201,7 +203,8 @@ fn missing(ids: &[impl AsRef<str>], why: &str) -> Vec<Parameter> {
     ids.iter().map(|id| Parameter::missing(id, why)).collect()
 }
 
-/// Starts a pool of bound threads, so that the caller's global pool has no influence. A limit on processes can refuse the threads.
+/// Starts a pool of bound threads, so that the caller's global pool has no influence. A limit on processes can refuse
+/// the threads.
 fn pool(threads: usize) -> Result<ThreadPool, String> {
     sapwise::internals::pinned_pool(u32::try_from(threads).unwrap_or(u32::MAX)).map_err(|e| e.to_string())
 }

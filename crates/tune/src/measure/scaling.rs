@@ -39,7 +39,8 @@ pub(super) fn measure(options: &Options) -> Result<Vec<Parameter>, String> {
     })
 }
 
-/// The sum of the rates of `threads` threads of the pool. Each thread divides by its own time, because they don't wake at once.
+/// The sum of the rates of `threads` threads of the pool. Each thread divides by its own time, because they don't
+/// wake at once.
 fn together(pool: &ThreadPool, threads: usize, rate: impl Fn() -> f64 + Sync) -> f64 {
     pool.broadcast(|worker| if worker.index() < threads { rate() } else { 0.0 }).iter().sum()
 }

@@ -10,8 +10,8 @@ use sapwise::tuning::{CostCurve, CostTerm};
 use std::sync::Arc;
 
 impl MethodModel {
-    /// Returns the cost of this method on one thread of a machine or on the GPUs of `backend`, with the places of its model and its
-    /// fallback there.
+    /// Returns the cost of this method on one thread of a machine or on the GPUs of `backend`, with the places of its
+    /// model and its fallback there.
     ///
     /// # Errors
     /// Names the missing hardware parameter or GPU, or what is wrong with the cost.

@@ -35,8 +35,8 @@ impl<'a> GpuSet<'a> {
         self.gpus.iter().map(of_one).try_fold(0.0, |slowest, sum| Ok(f64::max(slowest, sum?)))
     }
 
-    /// Returns the rates of all GPUs together: their sum, but at most the fastest times the ratio of the group. Of several ids a GPU
-    /// uses the first that it has.
+    /// Returns the rates of all GPUs together: their sum, but at most the fastest times the ratio of the group. Of
+    /// several ids a GPU uses the first that it has.
     ///
     /// # Errors
     /// Names the last parameter if a GPU has none of them.

@@ -12,10 +12,12 @@ use sapwise::internals::Helpers;
 pub struct HelpersModel {
     /// Cycles of the caller for each helper that it calls.
     pub call_cycles: f64,
-    /// Share of a cold fork and join ([`ParameterId::ForkJoinColdNs`]) by which helpers are late: that much work of one thread is lost.
+    /// Share of a cold fork and join ([`ParameterId::ForkJoinColdNs`]) by which helpers are late: that much work of
+    /// one thread is lost.
     pub late_share: f64,
-    /// Share of the work of one thread that stays serial (Amdahl, Validity of the single processor approach, 1967). The rest scales as
-    /// measured ([`ParameterId::ScalingTwoThreadsRatio`] and [`ParameterId::ScalingAllThreadsRatio`]).
+    /// Share of the work of one thread that stays serial (Amdahl, Validity of the single processor approach, 1967).
+    /// The rest scales as measured ([`ParameterId::ScalingTwoThreadsRatio`] and
+    /// [`ParameterId::ScalingAllThreadsRatio`]).
     pub serial_share: f64,
     /// Boxes that keep one thread busy: a frame uses one thread for each so many boxes. 0: it uses all threads.
     pub boxes_per_thread: u32,
@@ -34,7 +36,8 @@ pub struct ThreadFigures {
 }
 
 impl ThreadFigures {
-    /// Creates the figures from a cycle and a cold fork and join in nanoseconds, and work of several threads over work of one.
+    /// Creates the figures from a cycle and a cold fork and join in nanoseconds, and work of several threads over
+    /// work of one.
     #[must_use]
     pub const fn new(cycle_ns: f64, fork_join_cold_ns: f64, scaling: f64) -> Self {
         Self { cycle_ns, fork_join_cold_ns, scaling }

@@ -33,7 +33,8 @@ const NO_INTERVALS: &str =
     "no interval: too few machines like this one were measured to know the error of a prediction on it";
 
 /// What to do if a machine is unlike those of the training.
-const ASK: &str = "this machine is unlike those of the training: measure it with `sapwise probe --out report.json`, then \
+const ASK: &str = "this machine is unlike those of the training: measure it with `sapwise probe --out report.json`, \
+    then \
                    `sapwise predict --report report.json --measured`";
 
 /// Costs that are known already, by method and backend.
@@ -42,9 +43,9 @@ type Works<'a> = Vec<(&'a str, Backend, Arc<Work>)>;
 impl Model {
     /// Predicts the cost curves of `algorithms`, in the revisions that will run, on a machine.
     ///
-    /// Leaves out with a warning what it can't predict: a method that the model has not seen on that processor, another revision, a
-    /// GPU that the hardware does not hold, a missing or implausible parameter. A machine is extrapolated if a parameter lies outside
-    /// its [range](Range).
+    /// Leaves out with a warning what it can't predict: a method that the model has not seen on that processor,
+    /// another revision, a GPU that the hardware does not hold, a missing or implausible parameter. A machine is
+    /// extrapolated if a parameter lies outside its [range](Range).
     ///
     /// # Errors
     /// If no algorithm can be predicted, or a parameter of the machine has a value that no machine has.
@@ -61,7 +62,8 @@ impl Model {
         };
         if self.simulated {
             p.warnings.push(format!(
-                "the model {} was trained on simulated machines: what it predicts is no evidence; train on real reports",
+                "the model {} was trained on simulated machines: what it predicts is no evidence; train on real \
+                 reports",
                 self.name
             ));
         }
@@ -80,7 +82,8 @@ impl Model {
             };
             if method.revision != *revision {
                 p.warnings.push(format!(
-                    "{id} is left out: the model knows its revision {}, this build has {revision}; train on new reports",
+                    "{id} is left out: the model knows its revision {}, this build has {revision}; train on new \
+                     reports",
                     method.revision
                 ));
                 continue;
@@ -177,8 +180,9 @@ fn check_gpus(hardware: &Hardware, backend: &Backend) -> Result<(), PredictError
 impl Prediction {
     /// Returns the tuning, with `steps` and `crossovers` for the slice through `loads`, ascending by objects.
     ///
-    /// The interval of a crossover is the range in which the ratio of the two costs is nearer to one than nine of ten such ratios were
-    /// to their prediction on held-out machines. There is none if fewer than two were held out, or if the machine is extrapolated.
+    /// The interval of a crossover is the range in which the ratio of the two costs is nearer to one than nine of ten
+    /// such ratios were to their prediction on held-out machines. There is none if fewer than two were held out, or
+    /// if the machine is extrapolated.
     #[must_use]
     pub fn tuning(self, scenario: &str, loads: &[Load]) -> Tuning {
         let within = self.ratios_90_ln.filter(|_| !self.extrapolated);
@@ -186,7 +190,8 @@ impl Prediction {
         let mut tuning = Tuning::from_costs_with(Source::Predicted, scenario, self.costs, loads, spread);
         tuning.interval_basis = match within {
             Some(ln) => format!(
-                "within a factor of {:.2} of equal cost: on held-out machines nine of ten ratios of two times were that near their prediction",
+                "within a factor of {:.2} of equal cost: on held-out machines nine of ten ratios of two times were \
+                 that near their prediction",
                 ln.exp()
             ),
             None => {
@@ -223,7 +228,8 @@ impl Prediction {
 }
 
 impl Range {
-    /// Returns a warning if a value lies outside by more than a tenth: two measurements of one machine differ by up to that.
+    /// Returns a warning if a value lies outside by more than a tenth: two measurements of one machine differ by up
+    /// to that.
     fn excess(&self, name: &str, of: &str, value: Option<f64>) -> Option<String> {
         let value = value?;
         (value < self.min / 1.1 || value > self.max * 1.1).then(|| {

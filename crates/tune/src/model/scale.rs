@@ -10,8 +10,9 @@ use sapwise::named;
 named! {
     /// Nanoseconds of one unit of work on one thread of a machine or on some of its GPUs.
     ///
-    /// Latencies of several GPUs are those of the slowest, because a frame ends with the last of them. Rates are the sum of all, but
-    /// at most the rate of the fastest times the measured ratio of the group; without one, the plain sum.
+    /// Latencies of several GPUs are those of the slowest, because a frame ends with the last of them. Rates are the
+    /// sum of all, but at most the rate of the fastest times the measured ratio of the group; without one, the plain
+    /// sum.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
     #[non_exhaustive]
     pub enum Scale("scale") {
@@ -21,22 +22,23 @@ named! {
         Lane = "lane",
         /// One byte at the memory bandwidth of one thread.
         Byte = "byte",
-        /// One submission and the wait for it, and reading a few bytes of its result: `round_trip_ns` + `read_back_ns`, times
-        /// `group_round_trip_ratio` for several GPUs.
+        /// One submission and the wait for it, and reading a few bytes of its result: `round_trip_ns` +
+        /// `read_back_ns`, times `group_round_trip_ratio` for several GPUs.
         GpuRoundTrip = "gpu_round_trip",
         /// One dispatch that depends on the previous one in the same submission: `dispatch_ns`.
         GpuDispatch = "gpu_dispatch",
         /// One byte from the CPU to the GPU: 1 / `upload_rate_gb_per_s`, the slope over sizes. If that is missing,
         /// 1 / `upload_gb_per_s`, which includes the latency of 32 MiB. `group_upload_ratio` limits several GPUs.
         GpuUploadByte = "gpu_upload_byte",
-        /// One byte back: 1 / `download_rate_gb_per_s`, else 1 / `download_gb_per_s`. `group_upload_ratio` limits several GPUs: both
-        /// directions share the bus.
+        /// One byte back: 1 / `download_rate_gb_per_s`, else 1 / `download_gb_per_s`. `group_upload_ratio` limits
+        /// several GPUs: both directions share the bus.
         GpuDownloadByte = "gpu_download_byte",
-        /// One byte that a kernel moves in the GPU's memory: 1 / `read_gb_per_s`. If that is missing, 1 / `copy_gb_per_s`, although
-        /// the copy command of software adapters is many times faster than any kernel. `group_arithmetic_ratio` limits several GPUs.
+        /// One byte that a kernel moves in the GPU's memory: 1 / `read_gb_per_s`. If that is missing, 1 /
+        /// `copy_gb_per_s`, although the copy command of software adapters is many times faster than any kernel.
+        /// `group_arithmetic_ratio` limits several GPUs.
         GpuMemoryByte = "gpu_memory_byte",
-        /// One 32-bit floating-point operation with all lanes at work: 1 / `arithmetic_gflop_per_s`. `group_arithmetic_ratio` limits
-        /// several GPUs.
+        /// One 32-bit floating-point operation with all lanes at work: 1 / `arithmetic_gflop_per_s`.
+        /// `group_arithmetic_ratio` limits several GPUs.
         GpuOperation = "gpu_operation",
     }
 }
@@ -53,7 +55,8 @@ impl Scale {
         }
     }
 
-    /// Returns the hardware parameters of the machine that [`nanoseconds`](Self::nanoseconds) reads; none for a scale of GPUs.
+    /// Returns the hardware parameters of the machine that [`nanoseconds`](Self::nanoseconds) reads; none for a scale
+    /// of GPUs.
     #[must_use]
     pub fn parameters(self) -> &'static [ParameterId] {
         match self {

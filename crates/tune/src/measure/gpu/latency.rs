@@ -8,7 +8,8 @@ use sapwise_gpu::{GpuError, GpuErrorKind};
 
 pub(super) const SOURCE: &str = include_str!("shaders/latency.wgsl");
 
-/// Dispatches in the long pass beyond the first one. A sample lasts a millisecond, so that a report holds a few hundred at most.
+/// Dispatches in the long pass beyond the first one. A sample lasts a millisecond, so that a report holds a few
+/// hundred at most.
 const CHAIN: u32 = 500;
 
 /// The same on a software adapter.

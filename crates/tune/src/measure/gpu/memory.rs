@@ -10,7 +10,8 @@ const SOURCE: &str = include_str!("shaders/memory.wgsl");
 /// Bytes that a workgroup of the kernels reads or writes.
 const GROUP_BYTES: u64 = 65_536;
 
-/// Working set beyond the caches of a GPU, which reach 256 MiB, and of the CPU behind a software adapter, which is slow.
+/// Working set beyond the caches of a GPU, which reach 256 MiB, and of the CPU behind a software adapter, which is
+/// slow.
 const LARGEST: u64 = 512 << 20;
 const LARGEST_SOFTWARE: u64 = 128 << 20;
 
@@ -26,7 +27,8 @@ pub(super) fn measure(bench: &Bench<'_>, heaps: &[u64]) -> Vec<Parameter> {
     or_missing(&NAMES, bandwidths(bench, heaps))
 }
 
-/// The largest power of two up to `wanted` that the limits of the device and an eighth of its memory allow for one of two buffers.
+/// The largest power of two up to `wanted` that the limits of the device and an eighth of its memory allow for one of
+/// two buffers.
 fn set_bytes(wanted: u64, limits: &wgpu::Limits, heaps: &[u64]) -> u64 {
     let memory = heaps.iter().max().map_or(wanted, |bytes| bytes / 8);
     let limit = wanted.min(limits.max_buffer_size).min(limits.max_storage_buffer_binding_size).min(memory);
@@ -55,7 +57,8 @@ fn bandwidths(bench: &Bench<'_>, heaps: &[u64]) -> Result<Vec<Parameter>> {
     let mib = bytes >> 20;
     let methods = [
         format!(
-            "kernel that reads {mib} MiB of random data, vectors of 16 bytes, many dispatches in one submission, by the wall clock"
+            "kernel that reads {mib} MiB of random data, vectors of 16 bytes, many dispatches in one submission, by \
+             the wall clock"
         ),
         format!("copy command from one buffer of {mib} MiB to another, read and written bytes counted"),
     ];

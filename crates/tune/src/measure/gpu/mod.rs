@@ -1,4 +1,5 @@
-//! Measures the parameters of GPUs, each in about one second, and in twice that if a program on the CPU acts as the GPU.
+//! Measures the parameters of GPUs, each in about one second, and in twice that if a program on the CPU acts as the
+//! GPU.
 //!
 //! One file measures one family. If one family fails, its parameters are missing with the reason, and the others stay.
 
@@ -24,10 +25,10 @@ const WARM_UP: Duration = Duration::from_millis(50);
 
 /// Measures one GPU. Returns each of [`GpuParameterId::OF_ONE`] once: measured, reported or missing with a reason.
 ///
-/// The GPU is opened again, so that memory and submissions of the caller have no influence. A GPU that the program opened itself
-/// ([`Gpus::of`]) is measured as it is, and other work on it makes it look slower. [`Options::threads`] has no effect. With
-/// [`Options::limit`] only what a cost model reads is measured. A GPU that executes nothing ([`GpuParameterId::Executes`]) is not
-/// timed.
+/// The GPU is opened again, so that memory and submissions of the caller have no influence. A GPU that the program
+/// opened itself ([`Gpus::of`]) is measured as it is, and other work on it makes it look slower. [`Options::threads`]
+/// has no effect. With [`Options::limit`] only what a cost model reads is measured. A GPU that executes nothing
+/// ([`GpuParameterId::Executes`]) is not timed.
 ///
 /// # Errors
 /// [`GpuErrorKind::NotFound`] if there is no such GPU or its driver refuses to open it.
@@ -75,7 +76,8 @@ fn timed(opened: &Gpu, options: &Options, heaps: &[u64], began: Instant) -> Vec<
     .concat()
 }
 
-/// Measures GPUs that work at the same time. Returns each of [`GpuParameterId::GROUP`] once: measured or missing with a reason.
+/// Measures GPUs that work at the same time. Returns each of [`GpuParameterId::GROUP`] once: measured or missing with
+/// a reason.
 ///
 /// Order and repetition of the numbers have no influence. Each GPU is opened again.
 ///

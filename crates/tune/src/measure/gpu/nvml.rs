@@ -30,7 +30,8 @@ pub(super) fn query(pci: &str) -> Result<Vec<Parameter>, String> {
     Ok(found.into_iter().filter_map(|(id, value, source)| Some(Parameter::reported(id, value?, source))).collect())
 }
 
-/// Multiprocessors behind a number of CUDA cores, by the table of the CUDA programming guide. `None` for what it does not list.
+/// Multiprocessors behind a number of CUDA cores, by the table of the CUDA programming guide. `None` for what it does
+/// not list.
 fn processors(cores: u32, major: i32, minor: i32) -> Option<u32> {
     let each = match (major, minor) {
         (3, _) => 192,

@@ -1,7 +1,8 @@
 //! Uploads and downloads: the paper's two transfers, and the slope of a line over sizes.
 //!
-//! Staging buffers are kept and stay mapped between uses: `Queue::write_buffer` allocates on every call and was five times slower. If
-//! the CPU reaches all of the GPU's memory, the staging buffer of uploads may lie there; the total is the same.
+//! Staging buffers are kept and stay mapped between uses: `Queue::write_buffer` allocates on every call and was five
+//! times slower. If the CPU reaches all of the GPU's memory, the staging buffer of uploads may lie there; the total
+//! is the same.
 
 use std::time::{Duration, Instant};
 
@@ -66,9 +67,9 @@ impl Times {
 
     /// Bytes a nanosecond by the line `t = latency + bytes / rate` with the least sum of relative deviations.
     ///
-    /// Relative, because sizes span four orders of magnitude and the largest would decide otherwise. Deviations and not squares, so
-    /// that one spoiled time does not bend the line. Such a line goes through two of the points, or through one of them and the
-    /// origin, so all of these are tried. NaN if no line rises.
+    /// Relative, because sizes span four orders of magnitude and the largest would decide otherwise. Deviations and
+    /// not squares, so that one spoiled time does not bend the line. Such a line goes through two of the points, or
+    /// through one of them and the origin, so all of these are tried. NaN if no line rises.
     fn slope_rate(&self) -> f64 {
         let points = &self.0;
         let deviation = |latency: f64, slope: f64| -> f64 {
