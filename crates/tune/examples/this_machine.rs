@@ -7,7 +7,7 @@
 //! The first start measures the hardware in two seconds, predicts what each algorithm costs and keeps that in the
 //! user's cache folder. The second start reads it from there.
 
-use sapwise::{Aabb, Adaptive, BroadPhase, Pairs};
+use sapwise::{Aabb, BroadPhase, Pairs};
 use sapwise_tune::StartOptions;
 use std::error::Error;
 

@@ -2,7 +2,9 @@
 
 use sapwise::Registry;
 use sapwise::algorithm::{BackendClass, Load};
-use sapwise_tune::{Model, json};
+use sapwise_tune::{Hardware, Machine, Model, Parameter, ParameterId, json};
+use serde_json::Value;
+use std::sync::Arc;
 
 #[test]
 fn the_built_in_model_knows_every_method_of_this_build() {
@@ -61,4 +63,66 @@ fn old_files_are_refused_by_name() {
     let tuning = json::tuning("{\"schema\": \"fields/1\"}").unwrap_err().to_string();
     assert!(model.contains("\"model/1\"") && model.contains("`sapwise train REPORTS... --out MODEL.json`"), "{model}");
     assert!(tuning.contains("\"fields/1\"") && tuning.contains("`sapwise predict --out TUNING.json`"), "{tuning}");
+}
+
+/// A prediction of the built-in model for a machine of two cores, as a file.
+fn tuning_file() -> Value {
+    let figure = |id: ParameterId| match id {
+        ParameterId::CacheLlcBytes => 3.2e7,
+        ParameterId::ForkJoinColdNs => 60_000.0,
+        ParameterId::UsableCores => 2.0,
+        ParameterId::ScalingTwoThreadsRatio | ParameterId::ScalingAllThreadsRatio => 1.9,
+        ParameterId::SimdLanes => 8.0,
+        _ => 3.0,
+    };
+    let parameters = ParameterId::ALL.map(|id| Parameter::reported(id, figure(id), "test")).to_vec();
+    let loads: Vec<Load> = (3..20).map(|k| Load::of_objects(1 << k)).collect();
+    let hardware = Hardware::new(Machine::default(), parameters);
+    let model = Model::built_in().unwrap();
+    let prediction = model.predict(&hardware, Registry::with_cores(2).entries()).unwrap();
+    serde_json::from_str(&json::write_tuning(&prediction.tuning("uniform", &loads)).unwrap()).unwrap()
+}
+
+#[test]
+fn works_are_written_once_and_shared_again() {
+    let file = tuning_file();
+    let tuning = json::tuning(&file.to_string()).unwrap();
+    assert!(file["works"].as_array().unwrap().len() < tuning.costs.len());
+    let work = |id: &str| &tuning.costs.iter().find(|c| c.algorithm.to_string() == id).unwrap().curve.work;
+    assert!(Arc::ptr_eq(work("pair-cache@cpu1"), work("pair-cache@cpu2")));
+    let fallback = work("pair-cache@cpu1").fallback.as_ref().unwrap();
+    assert!(Arc::ptr_eq(&fallback.work, work("bvh@cpu1")));
+    assert_eq!(serde_json::from_str::<Value>(&json::write_tuning(&tuning).unwrap()).unwrap(), file);
+}
+
+#[test]
+fn impossible_tunings_are_refused_by_name() {
+    let refused = |change: &dyn Fn(&mut Value)| {
+        let mut file = tuning_file();
+        change(&mut file);
+        json::tuning(&file.to_string()).unwrap_err().to_string()
+    };
+    let cut = refused(&|f| f["works"].as_array_mut().unwrap().truncate(1));
+    assert!(cut.contains("there is no work") && cut.contains("@cpu"), "{cut}");
+    let places = refused(&|f| f["places"].as_array_mut().unwrap().truncate(3));
+    assert!(places.contains("more weights than places"), "{places}");
+    let huge = refused(&|f| f["works"][0]["residual"][0] = 1e300.into());
+    assert!(huge.contains("impossible weight"), "{huge}");
+    let repeated = refused(&|f| {
+        let first = f["costs"][0].clone();
+        f["costs"].as_array_mut().unwrap().push(first);
+    });
+    assert!(repeated.contains("stands there twice"), "{repeated}");
+    let itself = refused(&|f| {
+        let last = f["works"].as_array().unwrap().len() - 1;
+        f["works"][last]["fallback"] = serde_json::json!({ "work": last, "factor": 1.0 });
+    });
+    assert!(itself.contains("does not stand before it"), "{itself}");
+    let threads = refused(&|f| {
+        let none = serde_json::json!({
+            "threads": 1, "call_ns": 0.0, "late_ns": 0.0, "speed_up": 1.0, "boxes_per_thread": 0
+        });
+        f["costs"][0]["helpers"] = none;
+    });
+    assert!(threads.contains("helpers of fewer than two threads"), "{threads}");
 }

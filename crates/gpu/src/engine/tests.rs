@@ -7,7 +7,8 @@ use crate::params::{Header, Params};
 use crate::{Gpus, first_for_tests};
 use sapwise::Aabb;
 use sapwise::error::GpuErrorKind;
-use sapwise::internals::{SampledBoxes, Scenario, Scene};
+use sapwise::internals::SampledBoxes;
+use sapwise_scenes::Scenario;
 use sapwise::{PairOrder, Pairs};
 use wgpu::util::DeviceExt;
 
@@ -16,7 +17,7 @@ const SORTING: [&str; 3] = ["sap", "grid-sap", "bvh"];
 
 /// Returns boxes of all sizes, each among many: every row has more candidates than the budgets below.
 fn crowded() -> Vec<Aabb> {
-    let mut scene = Scene::start(Scenario::Mixed, 700, 9);
+    let mut scene = Scenario::Mixed.start(700, 9);
     scene.advance();
     let far = (0..50).map(|k| Aabb::cube([1.0e6, k as f32, 0.0], 3.0));
     scene.boxes().iter().copied().chain(far).collect()

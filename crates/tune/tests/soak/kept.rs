@@ -2,7 +2,6 @@
 
 use super::{Machine, Tally, below, life, registry};
 use crate::common::Random;
-use sapwise::Adaptive;
 use sapwise::internals::Origin;
 use sapwise_tune::StartOptions;
 use std::fs;
