@@ -205,7 +205,7 @@ fn more_threads_than_the_pool_has_are_unavailable() {
         let Err(Error::Unavailable { reason, .. }) = registry.create(&text.parse().unwrap()) else {
             panic!("made {text}")
         };
-        assert!(reason.to_string().contains("has 4 threads, with the calling one 5"), "{reason}");
+        assert!(reason.to_string().contains("more than the 4 threads of the given pool"), "{reason}");
     }
     registry.use_pool(self::pool(1));
     assert_eq!((counts(&registry, true), counts(&registry, false)), (vec![1, 2], vec![4, 5, 8]));

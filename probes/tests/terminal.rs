@@ -57,6 +57,6 @@ fn a_pipe_gets_no_colours() {
     let report = folder.path().join("report.json");
     fs::write(&report, small_report("a").to_string()).unwrap();
     let text = success(command.args(["predict", "--no-gpus", "--report"]).arg(report));
-    assert!(text.is_ascii() && !text.contains('\u{1b}'), "{text}");
+    assert!(!text.contains('\u{1b}'), "{text}");
     assert!(text.contains("\nNext: "), "{text}");
 }

@@ -236,8 +236,8 @@ mod tests {
     fn parameters_without_an_id_are_written_back_as_they_were_read() {
         let text = r#"{"machine":{"physical_id":"0123456789abcdef","cpu":"","vendor":"","arch":"","os":"","simd":"avx2",
             "hypervisor":"none"},"parameters":[{"name":"arithmetic_one_thread_gflop_per_s","value":2.5,"dispersion":0.6,
-            "samples":4,"spoiled":1,"foreign_load":0.01,"how":"measured","source":"fused \
-             multiply-adds","raw":[4.0,1.0,3.0,2.0]}],
+            "samples":4,"spoiled":1,"foreign_load":0.01,"how":"measured",
+            "source":"fused multiply-adds","raw":[4.0,1.0,3.0,2.0]}],
             "gpus":[{"gpu":{"index":0,"name":"a","device":"10de:2335","driver":"b","api":"vulkan","kind":"discrete"},
             "parameters":[{"name":"atomic_g_per_s","value":720.976,"dispersion":null,"samples":1,"spoiled":0,
             "foreign_load":null,"how":"reported","source":"c"},{"name":"parallel_units","value":132.0,"dispersion":0.0,

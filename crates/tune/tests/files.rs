@@ -124,5 +124,5 @@ fn impossible_tunings_are_refused_by_name() {
         });
         f["costs"][0]["helpers"] = none;
     });
-    assert!(threads.contains("helpers of fewer than two threads"), "{threads}");
+    assert!(threads.contains("helpers have fewer than two threads"), "{threads}");
 }
