@@ -3,10 +3,11 @@
 use super::Arguments;
 use clap::Parser;
 
-const DOCUMENTS: [(&str, &str); 9] = [
+const DOCUMENTS: [(&str, &str); 10] = [
     ("README.md", include_str!("../../../README.md")),
     ("CONTRIBUTING.md", include_str!("../../../CONTRIBUTING.md")),
     ("datasets/README.md", include_str!("../../../datasets/README.md")),
+    ("docs/fleet.md", include_str!("../../../docs/fleet.md")),
     ("docs/guide.md", include_str!("../../../docs/guide.md")),
     ("docs/python.md", include_str!("../../../docs/python.md")),
     ("docs/research.md", include_str!("../../../docs/research.md")),
