@@ -16,4 +16,4 @@ target=aarch64-unknown-linux-gnu
 export CARGO_INCREMENTAL=0 CARGO_PROFILE_DEV_DEBUG=false
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64 -L /usr/aarch64-linux-gnu"
-cargo test -p sapwise --locked --quiet --target $target --features model --lib --test contract --test golden --test filter
+cargo test -p sapwise --locked --quiet --target $target --lib --test contract --test golden --test filter

@@ -14,4 +14,4 @@ else
     rmdir "$disk"
     echo "kills: no disk is filled: a small one can't be mounted here" >&2
 fi
-SAPWISE_KILLS=${1:-100} cargo test -p sapwise-cli --locked --test kills -- --nocapture
+SAPWISE_KILLS=${1:-100} cargo test -p sapwise-cli --features long-tests --locked --test kills -- --nocapture

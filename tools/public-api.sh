@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
 # Lists the public API of the library, with all features, so that a change of it shows in a diff.
 #
-#     tools/public-api.sh            writes docs/public-api.txt
+#     tools/public-api.sh            writes tools/public-api.txt
 #     tools/public-api.sh --check    says what differs from it, and fails if anything does
 #
 # It reads what rustdoc writes with tools/public-api, which cargo builds here.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-list=docs/public-api.txt
+list=tools/public-api.txt
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 

@@ -19,7 +19,7 @@ export CARGO_INCREMENTAL=0 CARGO_PROFILE_DEV_DEBUG=line-tables-only
 # What is leaked at the end of a program is none of its business: threads of pools may still run.
 address() {
     ASAN_OPTIONS=detect_leaks=0 RUSTC_BOOTSTRAP=1 RUSTFLAGS=-Zsanitizer=address CARGO_TARGET_DIR=$folder/address \
-        cargo test -p sapwise --locked --quiet --target "$host" --features this-machine --lib --tests
+        cargo test -p sapwise -p sapwise-tune --locked --quiet --target "$host" --lib --tests
 }
 
 threads() {
@@ -41,7 +41,7 @@ valgrind() {
     [ -x "$(type -P valgrind)" ] || { apt-get update -q; apt-get install -qy --no-install-recommends valgrind; }
     local runner=CARGO_TARGET_${host//-/_}_RUNNER
     env "${runner^^}=valgrind --quiet --error-exitcode=9" \
-        cargo test -p sapwise --locked --quiet --features measure --test small --test threads --test measure
+        cargo test -p sapwise -p sapwise-tune --locked --quiet --test small --test threads --test measure
 }
 
 parts=("$@")

@@ -196,7 +196,7 @@ for rule in VUID-vkCmdFillBuffer-dstBuffer-00029 SYNC-HAZARD-WRITE-AFTER-WRITE; 
     messages | grep -F "$rule" >/dev/null || fail "the validation layers don't report $rule"
 done
 # All methods, the measurements, pieces and windows. Tests that repeat the same calls at other sizes take minutes.
-for tests in "--lib gpu::" "--test gpu_device" "--test gpu_resident" "--test measure_gpu" \
+for tests in "-p sapwise-gpu --lib" "--test gpu_device" "--test gpu_resident" "--test measure_gpu" \
     "--test gpu_contract random_boxes" "--test gpu_faults come_in_"; do
     # shellcheck disable=SC2086 # Words of cargo's.
     watched cargo test --quiet --locked $tests

@@ -347,7 +347,7 @@ fn of_a_folder_a_table_says_which_reports_agree() {
     );
     assert!(row("/full.json")[1] == row("slow.json")[1] && row("elsewhere.json")[1] != row("slow.json")[1], "{told}");
     for text in [
-        "2.0 × the time of the other reports",
+        "1.98 × the time of the other reports",
         "bad.json: BAD",
         "Kind 1: none, 64 cores, portable, no GPU",
         "3 of 5 reports can be believed",

@@ -48,7 +48,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// SapwiseError
 ///     No algorithm can run.
 ///
-/// Notes ----- Several threads may use it: a call waits until the previous one has ended, without the interpreter's
+/// Notes
+/// -----
+/// Several threads may use it: a call waits until the previous one has ended, without the interpreter's
 /// lock. After a fork the child starts anew with the same arguments, the same filter and its own threads.
 ///
 /// Examples
@@ -179,7 +181,9 @@ impl PyBroadPhase {
     /// TooManyPairsError
     ///     More pairs than ``limit``. ``limit`` of the exception has it.
     ///
-    /// Notes ----- After an error nothing has begun or ended, and the next frame is compared with the last one that
+    /// Notes
+    /// -----
+    /// After an error nothing has begun or ended, and the next frame is compared with the last one that
     /// succeeded. ``pairs`` says which input is copied. Ctrl-C works before and after a frame, not within.
     #[pyo3(signature = (boxes, upper=None, *, ids=None))]
     fn find<'py>(

@@ -205,7 +205,9 @@ fn with_engine<'py>(
 /// TooManyPairsError
 ///     More pairs than ``limit``. ``limit`` of the exception has it.
 ///
-/// Notes ----- 32-bit floats of shape (n, 6) in C order are read in place; nothing may write to them meanwhile.
+/// Notes
+/// -----
+/// 32-bit floats of shape (n, 6) in C order are read in place; nothing may write to them meanwhile.
 /// Everything else is copied. 64-bit floats are rounded to 32 bits: no pair is lost, and nearly touching boxes may gain
 /// one. The interpreter's lock is released. Ctrl-C works before and after, not within.
 ///

@@ -1,7 +1,7 @@
 //! The fastest broad phase of this machine, without a benchmark.
 //!
 //! ```sh
-//! cargo run --release -p sapwise --example this_machine --features this-machine
+//! cargo run --release -p sapwise-tune --example this_machine
 //! ```
 //!
 //! The first start measures the hardware in two seconds, predicts what each algorithm costs and keeps that in the

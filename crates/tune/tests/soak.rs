@@ -283,7 +283,7 @@ fn failures_lose_no_pair_and_leak_no_memory() {
     let mut lowest = isize::MAX;
     while tally.frames < frames {
         let length = (LIFE / 2 + below(&mut random, LIFE)).min(frames - tally.frames);
-        if cfg!(feature = "this-machine") && below(&mut random, 4) == 0 {
+        if below(&mut random, 4) == 0 {
             kept.program(length, &mut random, &mut tally);
         } else {
             let learned = program(known, length, &mut random, &mut tally);

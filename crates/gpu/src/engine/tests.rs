@@ -8,8 +8,8 @@ use crate::{Gpus, first_for_tests};
 use sapwise::Aabb;
 use sapwise::error::GpuErrorKind;
 use sapwise::internals::SampledBoxes;
-use sapwise_scenes::Scenario;
 use sapwise::{PairOrder, Pairs};
+use sapwise_scenes::Scenario;
 use wgpu::util::DeviceExt;
 
 const METHODS: [&str; 4] = ["brute", "sap", "grid-sap", "bvh"];

@@ -67,8 +67,8 @@ impl StartOptions {
     }
 
     /// The algorithms to choose from: your own, your thread pool ([`Registry::use_pool`]), your GPUs
-    /// (`Registry::add_gpus`). [default: ours on all usable cores, without pinned threads, and with the feature
-    /// `measure-gpu` on every GPU that is not a software adapter]
+    /// (`sapwise_gpu::add_to`). [default: ours on all usable cores, without pinned threads, and with the feature
+    /// `gpu` on every GPU that is not a software adapter]
     #[must_use]
     pub fn registry(self, registry: Arc<Registry>) -> Self {
         Self { registry: Some(registry), ..self }
