@@ -33,7 +33,7 @@ fn random_boxes_of_every_small_count() {
 fn every_scenario_on_several_frames() {
     let mut algorithms = every_algorithm();
     for scenario in Scenario::ALL {
-        for objects in [10, 500, 4000] {
+        for objects in [10, 500, if cfg!(feature = "long-tests") { 4000 } else { 2500 }] {
             let mut scene = scenario.start(objects, 42);
             for frame in 0..3 {
                 assert_all_agree(&format!("{scenario} frame {frame}"), scene.boxes(), &mut algorithms);

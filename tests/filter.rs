@@ -18,7 +18,7 @@ fn wanted_pairs_of_every_scenario() {
     let mut canonical = Pairs::with_order(PairOrder::Canonical);
     let mut any = Pairs::new();
     for scenario in Scenario::ALL {
-        for objects in [12, 700, 4000] {
+        for objects in [12, 700, if cfg!(feature = "long-tests") { 4000 } else { 2500 }] {
             let mut scene = scenario.start(objects, 42);
             for frame in 0..2 {
                 let boxes = scene.boxes();

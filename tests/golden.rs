@@ -133,5 +133,6 @@ fn every_algorithm_finds_the_golden_pairs() {
     let few = every_algorithm().into_iter();
     let few = few.filter(|(id, _)| id.contains("@cpu1 ") || id.ends_with(&format!("@cpu7 at {fastest}")));
     assert_golden(SMALL, few.collect());
-    assert_golden(LARGE, every_algorithm());
+    let all = |id: &str| cfg!(feature = "long-tests") || id.ends_with(&format!(" at {fastest}"));
+    assert_golden(LARGE, every_algorithm().into_iter().filter(|(id, _)| all(id)).collect());
 }
