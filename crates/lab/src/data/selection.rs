@@ -78,6 +78,8 @@ impl Selection {
             }));
             profile.retain(|t| t.revision == newest_of(&t.id));
         }
+        // The fit depends on the order a little: the same reports must give the same model however they are named.
+        self.profiles.sort_by(|a, b| a.file.cmp(&b.file));
         let (kept, empty): (Vec<_>, Vec<_>) = self.profiles.into_iter().partition(|p| !p.points.is_empty());
         let why = format!("no point has {FEWEST_SAMPLES} samples of a current algorithm");
         self.notes.extend(empty.iter().map(|p| format!("{} is left out: {why}", p.file)));
