@@ -112,7 +112,8 @@ fn a_gpu_that_lacks_a_parameter_costs_its_own_rows_only() {
     gpu.parameters.retain(|p| p.name != GpuParameterId::DispatchNs);
     let (models, notes) = fitted(&all);
     assert_eq!(models.len(), truth().len() + gpu_truth().len());
-    assert!(notes.iter().all(|n| n.contains("dispatch_ns") && n.contains("gpu1")) && notes.len() == 3, "{notes:?}");
+    let told = |n: &String| n.contains("dispatch_ns") && n.contains("gpu1");
+    assert!(!notes.is_empty() && notes.iter().all(told), "{notes:?}");
 }
 
 #[test]
