@@ -37,7 +37,7 @@ fn predict(c: &mut Criterion) {
         c.benchmark_group(format!("{costs} algorithms, {crossovers} crossovers, a model of {} kB", text.len() / 1000));
     group.bench_function("read the model", |b| b.iter(|| json::model(black_box(text)).expect("a sound model")));
     group.bench_function("predict", |b| {
-        b.iter(|| model.predict(black_box(&hardware), &algorithms).expect("known methods"))
+        b.iter(|| model.predict(black_box(&hardware), &algorithms).expect("known methods"));
     });
     group.bench_function("tuning", |b| b.iter(|| prediction.clone().tuning("uniform", black_box(&loads))));
     group.bench_function("all", |b| {

@@ -64,14 +64,6 @@ impl Contestant {
             Algorithm::Other(algorithm) => algorithm.find_pairs(boxes, pairs),
         }
     }
-
-    /// What the adaptive one chose last.
-    pub(crate) fn chosen(&self) -> Option<&AlgorithmId> {
-        match &self.algorithm {
-            Algorithm::Adaptive(adaptive) => adaptive.last_decision().map(|d| d.algorithm),
-            Algorithm::Other(_) => None,
-        }
-    }
 }
 
 /// Ours: the adaptive one over this tuning, and every method that the registry lists.

@@ -17,8 +17,6 @@ pub(crate) struct Point {
     pub(crate) scenario: Scenario,
     pub(crate) objects: usize,
     pub(crate) lanes: Vec<Lane>,
-    /// What the adaptive one chose in each timed frame.
-    pub(crate) choices: Vec<String>,
     /// Names of those who left, since a frame took too long.
     pub(crate) left: Vec<String>,
     /// Share of the CPU, 0 to 1, that other programs took during the timed frames. `None` where they were too short
@@ -65,12 +63,5 @@ impl Point {
     /// The time of the fastest peer over that of the adaptive one.
     pub(crate) fn gain(&self) -> Option<Quartiles> {
         Some(self.best(Side::Peer)?.over(self.best(Side::Adaptive)?))
-    }
-
-    /// What the adaptive one chose most often, and in what share of the frames.
-    pub(crate) fn choice(&self) -> Option<(&str, f64)> {
-        let count = |name: &String| self.choices.iter().filter(|c| *c == name).count();
-        let most = self.choices.iter().max_by_key(|name| count(name))?;
-        Some((most, count(most) as f64 / self.choices.len() as f64))
     }
 }

@@ -125,7 +125,7 @@ pub(crate) fn race(
     }
     let lane = |c: &Contestant| Lane { name: c.name.clone(), side: c.side, seconds: Vec::new() };
     let lanes = race.contestants.iter().map(lane).collect();
-    let mut point = Point { scenario, objects, lanes, choices: Vec::new(), left, foreign_load: None };
+    let mut point = Point { scenario, objects, lanes, left, foreign_load: None };
     let watch = Watch::begin();
     let most = if settings.full { MOST_FRAMES[usize::from(objects > 1_000)] } else { FEWEST_FRAMES };
     let (started, mut frames) = (Instant::now(), 0);
@@ -138,7 +138,6 @@ pub(crate) fn race(
             for (lane, took) in point.lanes.iter_mut().zip(taken.into_iter().flatten()) {
                 lane.seconds.push(took.as_secs_f64());
             }
-            point.choices.extend(race.contestants.iter().find_map(Contestant::chosen).map(ToString::to_string));
         }
     }
     point.foreign_load = watch.is_long_enough().then(|| watch.foreign_load()).flatten();

@@ -105,9 +105,9 @@ impl BroadPhase for PairCache {
                     // The grown boxes may be half of this frame and half of the previous one.
                     self.grown.forget();
                     if let Ok(kept) = kept {
-                        self.motion.stop(kept == Kept::Incomplete)
+                        self.motion.stop(kept == Kept::Incomplete);
                     } else {
-                        self.motion.interrupt()
+                        self.motion.interrupt();
                     }
                 }
                 kept?

@@ -1,11 +1,9 @@
 //! Starts on this machine: from nothing, from the cache, in the foreground and in the background, with frames
 //! throughout.
 
-#[path = "../../../tests/common/mod.rs"]
+#[cfg_attr(feature = "gpu", path = "../../gpu/tests/common/mod.rs")]
+#[cfg_attr(not(feature = "gpu"), path = "../../../tests/common/mod.rs")]
 mod common;
-#[cfg(feature = "gpu")]
-#[path = "../../gpu/tests/common/mod.rs"]
-mod gpu_common;
 
 use common::{Random, naive};
 use sapwise::tuning::Source;
@@ -291,7 +289,7 @@ fn a_program_without_a_registry_gets_all_our_algorithms() {
 fn a_program_brings_its_pool_and_its_gpu() {
     use sapwise::rayon1 as rayon;
     use sapwise_gpu::{Gpu, Gpus, wgpu30 as wgpu};
-    let Some(gpus) = gpu_common::gpus() else { return };
+    let Some(gpus) = common::gpus() else { return };
     let folder = tempfile::tempdir().unwrap();
     let opened = gpus.adapter(0).unwrap().request_device(&wgpu::DeviceDescriptor::default());
     let (device, queue) = pollster::block_on(opened).unwrap();

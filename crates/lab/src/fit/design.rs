@@ -20,6 +20,7 @@ use sapwise_tune::hardware::ParameterId;
 use sapwise_tune::model::{FallbackModel, HelpersModel, MethodModel, ModelTerm, PredictError, ThreadFigures};
 use sapwise_tune::{GpuKind, Hardware};
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::sync::Arc;
 
 /// Points on one thread, or on GPUs, that a method needs on all machines together.
@@ -209,7 +210,7 @@ impl Design {
         let mut called = Vec::new();
         for k in (0..all.len()).step_by(all.len().div_ceil(MOST_CALLED).max(1)) {
             let (row, profile) = (all[k], &profiles[all[k].profile]);
-            if !works.contains_key(&row.profile) {
+            if let Entry::Vacant(place) = works.entry(row.profile) {
                 let one = &Backend::Cpu(1);
                 let fallback = match (&model.fallback, other) {
                     (Some(f), Some(other)) => {
@@ -218,7 +219,7 @@ impl Design {
                     }
                     _ => None,
                 };
-                works.insert(row.profile, model.work(&profile.hardware, one, places, fallback)?);
+                place.insert(model.work(&profile.hardware, one, places, fallback)?);
             }
             let threads = profile.id(row.algorithm).threads();
             model.max_threads = model.max_threads.max(threads);
@@ -252,10 +253,11 @@ impl Design {
         for row in rows {
             let (profile, backend) = (&profiles[row.profile], profiles[row.profile].id(row.algorithm).backend());
             let at = (row.profile, backend);
-            if !works.contains_key(&at) {
-                works.insert(at, other.work(&profile.hardware, backend, places, None)?);
-            }
-            all.push(works[&at].ns(&row.load));
+            let work = match works.entry(at) {
+                Entry::Occupied(known) => known.into_mut(),
+                Entry::Vacant(place) => place.insert(other.work(&profile.hardware, backend, places, None)?),
+            };
+            all.push(work.ns(&row.load));
         }
         Ok(all)
     }

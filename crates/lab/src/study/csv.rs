@@ -5,10 +5,10 @@ use anyhow::Result;
 use sapwise::algorithm::{Backend, BackendClass};
 
 /// Writes a table with these columns.
-fn table(columns: &str, rows: impl Iterator<Item = Vec<String>>) -> Result<String> {
+fn table(columns: &str, mut rows: impl Iterator<Item = Vec<String>>) -> Result<String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(columns.split(' '))?;
-    rows.map(|row| writer.write_record(row)).collect::<Result<(), _>>()?;
+    rows.try_for_each(|row| writer.write_record(row))?;
     Ok(String::from_utf8(writer.into_inner()?)?)
 }
 
