@@ -71,8 +71,8 @@ impl Helpers {
     }
 }
 
-/// Makes a pool of `threads` threads. Pins each to its own CPU if there are enough and [that is
-/// allowed](crate::cpu::placement::may_pin).
+/// Makes a pool of `threads` threads. Pins each to its own CPU if there are enough and that is
+/// allowed.
 ///
 /// # Errors
 /// [`Unavailable::ThreadsRefused`].
