@@ -235,6 +235,8 @@ impl Registry {
 
     /// Returns the kind of helper threads, in a word.
     #[doc(hidden)]
+    #[cfg(feature = "parallel")]
+    #[must_use]
     pub fn helpers(&self) -> &'static str {
         self.threads.kind()
     }

@@ -19,6 +19,7 @@ mod threads;
 mod tree;
 mod workers;
 
+#[cfg(feature = "parallel")]
 pub use helpers::pinned_pool;
 pub(crate) use level::Simd;
 pub use level::{SimdLevel, SimdLevelError};

@@ -26,7 +26,13 @@ pub struct Threads {
 impl Threads {
     /// Makes pools whose threads are pinned.
     pub fn pinned() -> Self {
-        Self { pinned: true, ..Self::default() }
+        Self {
+            pinned: true,
+            #[cfg(feature = "parallel")]
+            pools: Mutex::default(),
+            #[cfg(feature = "parallel")]
+            given: None,
+        }
     }
 
     /// Takes a program's pool. Its threads run where the program has them.
@@ -37,6 +43,7 @@ impl Threads {
     }
 
     /// Returns what these threads are: `pinned`, `free`, or `given` by the program.
+    #[cfg(feature = "parallel")]
     pub fn kind(&self) -> &'static str {
         match (&self.given, self.pinned && crate::cpu::placement::may_pin()) {
             (Some(_), _) => "given",

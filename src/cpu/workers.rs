@@ -84,7 +84,6 @@ impl Workers {
     /// Runs one phase: hands out the tasks one by one to the caller and its helpers. Returns when all are done.
     ///
     /// The caller works instead of sleeping: waking a thread takes tens of microseconds, which a frame would pay twice.
-    #[cfg_attr(not(feature = "parallel"), expect(clippy::unused_self, reason = "without threads nobody helps"))]
     pub fn each_of<I: Iterator<Item: Send> + Send>(&self, tasks: I, work: impl Fn(I::Item) + Sync) {
         #[cfg(feature = "parallel")]
         // A single task needs no help.
