@@ -5,7 +5,7 @@ use crate::error::{failed, unusable, with_cause};
 use crate::start;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use sapwise::{Adaptive, Tuning};
+use sapwise::Tuning;
 use sapwise::algorithm::Load;
 use sapwise_tune::{Setup, json};
 use std::sync::mpsc::{RecvTimeoutError, channel};
