@@ -3,8 +3,8 @@
 use crate::oracle::Answer;
 use crate::scene::Scene;
 use crate::source::Source;
-use sapwise::{Adaptive, AlgorithmId, BroadPhase, Pairs, Registry, Tuning};
 use sapwise::algorithm::SimdLevel;
+use sapwise::{Adaptive, AlgorithmId, BroadPhase, Pairs, Registry, Tuning};
 use sapwise_tune::{Hardware, Model};
 use std::sync::LazyLock;
 

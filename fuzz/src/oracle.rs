@@ -1,8 +1,8 @@
 //! Answers by definition.
 
-use sapwise::{Aabb, Error, Membership};
 use sapwise::error::BoxDefect;
 use sapwise::internals::Pair;
+use sapwise::{Aabb, Error, Membership};
 use std::collections::BTreeSet;
 
 /// The answer that every algorithm must give.

@@ -36,6 +36,7 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// Returns the boxes of the present frame.
     #[must_use]
     pub fn boxes(&self) -> &[Aabb] {
         &self.boxes

@@ -4,13 +4,13 @@
 
 use libfuzzer_sys::{fuzz_mutator, fuzz_target, fuzzer_mutate};
 use sapwise::{Adaptive, BroadPhase, Error, Registry, Tuning};
-use sapwise_tune::{Hardware, Model, json};
 use sapwise_fuzz::checked::{check, hardware};
 use sapwise_fuzz::oracle::Answer;
 use sapwise_fuzz::scene::Scene;
 use sapwise_fuzz::{Source, json::damaged};
 use sapwise_lab::fit::measured_tuning;
 use sapwise_lab::report;
+use sapwise_tune::{Hardware, Model, json};
 use std::sync::LazyLock;
 
 static REGISTRY: LazyLock<Registry> = LazyLock::new(|| Registry::with_cores(2));

@@ -3,10 +3,10 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use sapwise::{AlgorithmId, Registry};
 use sapwise::algorithm::{Backend, SimdLevel};
-use sapwise_tune::{ParameterId, json};
+use sapwise::{AlgorithmId, Registry};
 use sapwise_scenes::Scenario;
+use sapwise_tune::{ParameterId, json};
 use std::fmt::Display;
 use std::str::FromStr;
 use std::sync::LazyLock;

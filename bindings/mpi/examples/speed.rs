@@ -8,8 +8,8 @@
 use mpi::Threading;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Source};
-use sapwise::{Aabb, Adaptive, BroadPhase, Pairs, Registry, Tuning};
 use sapwise::algorithm::SimdLevel;
+use sapwise::{Aabb, Adaptive, BroadPhase, Pairs, Registry, Tuning};
 use sapwise_mpi::{Distributed, MpiExchange, RankPairs};
 use sapwise_ranks::Exchange;
 use sapwise_scenes::Scenario;
@@ -195,8 +195,6 @@ fn unequal(world: &impl Communicator) {
         let [low, median, high] = quartiles(&mut over.collect::<Vec<_>>());
         let shares: Vec<f64> =
             times.last().map_or(Vec::new(), |(_, boxes)| boxes.iter().map(|b| b / boxes.iter().sum::<f64>()).collect());
-        println!(
-            "{name}: slowest over balanced {median:.3} ({low:.3} to {high:.3}); shares of the boxes {shares:.3?}"
-        );
+        println!("{name}: slowest over balanced {median:.3} ({low:.3} to {high:.3}); shares of the boxes {shares:.3?}");
     }
 }

@@ -5,8 +5,8 @@ use crate::narrow::rounded;
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
-use sapwise::{Aabb, Error};
 use sapwise::error::BoxDefect;
+use sapwise::{Aabb, Error};
 
 /// The boxes of a caller during a call.
 pub(crate) enum Boxes<'py> {

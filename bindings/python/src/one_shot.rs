@@ -7,8 +7,8 @@ use crate::start;
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::prelude::*;
-use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Filter, Membership, PairOrder, Pairs, Registry, Tuning};
 use sapwise::tuning::Step;
+use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Filter, Membership, PairOrder, Pairs, Registry, Tuning};
 use sapwise_tune::StartOptions;
 use std::sync::{Arc, Mutex, PoisonError};
 
