@@ -16,7 +16,7 @@ import numpy as np
 
 import sapwise
 
-folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).resolve().parents[2] / "datasets"
+folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).resolve().parents[3] / "datasets"
 picture = Path(sys.argv[2]) if len(sys.argv) > 2 else Path("study.png")
 
 # %% Time over the number of boxes, for each algorithm, on all hosts: three lines.

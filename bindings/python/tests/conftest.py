@@ -12,7 +12,7 @@ import pytest
 # Before the first use: no test reads or writes the cache of the user.
 os.environ["XDG_CACHE_HOME"] = tempfile.mkdtemp(prefix="sapwise-tests-")
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def naive(boxes, others=None):

@@ -88,7 +88,7 @@ def test_a_probe_tells_of_each_family():
     assert set(hardware.parameters["unit"]) > {"cores", "GHz"}
     assert hardware.machine["os"] == "linux" and "host" not in hardware.machine
     report = json.loads((ROOT / "datasets/amd-epyc-zen3-2c/full.json").read_text())
-    assert set(names) == {p["name"] for p in report["hardware"]["parameters"]}
+    assert set(names) <= {p["name"] for p in report["hardware"]["parameters"]}
 
 
 def test_what_progress_raises_ends_a_probe():

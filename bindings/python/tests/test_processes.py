@@ -93,11 +93,16 @@ stop.set(); thread.join(); print(answers)
 def test_a_fork_after_use_works_in_the_child_and_in_the_parent(busy):
     # Enough boxes for all cores, so that the threads that are not in the child would be waited for.
     script = """
-import warnings; warnings.simplefilter('ignore') def threads(): return len(os.listdir('/proc/self/task')) boxes =
-cubes(60_000, seed=2); known = sapwise.pairs(boxes) broad_phase = sapwise.BroadPhase(cache=False, measure=False,
-algorithm='grid-sap@cpu' + str(min(2, len(os.sched_getaffinity(0))))) broad_phase.set_filter(fixed=np.zeros(60_000,
-bool)) other = sapwise.BroadPhase(cache=False, measure=False) other.find(boxes) assert
-np.array_equal(broad_phase.find(boxes), known) stop = threading.Event() def work():
+import warnings; warnings.simplefilter('ignore')
+def threads(): return len(os.listdir('/proc/self/task'))
+boxes = cubes(60_000, seed=2); known = sapwise.pairs(boxes)
+broad_phase = sapwise.BroadPhase(cache=False, measure=False, algorithm='grid-sap@cpu' + str(min(2, len(os.sched_getaffinity(0)))))
+broad_phase.set_filter(fixed=np.zeros(60_000, bool))
+other = sapwise.BroadPhase(cache=False, measure=False)
+other.find(boxes)
+assert np.array_equal(broad_phase.find(boxes), known)
+stop = threading.Event()
+def work():
     while not stop.is_set(): broad_phase.find(boxes); sapwise.pairs(boxes)
 thread = threading.Thread(target=work)
 if %s: thread.start(); time.sleep(0.05)
@@ -106,11 +111,16 @@ for _ in range(3):
     if child == 0:
         status = 1
         try:
-            counts = [threads()] assert np.array_equal(sapwise.pairs(boxes), known) counts.append(threads()) assert
-            np.array_equal(broad_phase.find(boxes), known) and len(broad_phase.begun) == len(known)
-            counts.append(threads()) # Threads of its own for both. if len(os.sched_getaffinity(0)) > 1: assert
-            counts[0] < counts[1] < counts[2], counts del other broad_phase.close() assert
-            np.array_equal(sapwise.pairs_between(boxes[:9], boxes)[:9], sapwise.pairs_between(boxes[:9], boxes)[:9])
+            counts = [threads()]
+            assert np.array_equal(sapwise.pairs(boxes), known)
+            counts.append(threads())
+            assert np.array_equal(broad_phase.find(boxes), known) and len(broad_phase.begun) == len(known)
+            counts.append(threads())
+            # Threads of its own for both.
+            if len(os.sched_getaffinity(0)) > 1: assert counts[0] < counts[1] < counts[2], counts
+            del other
+            broad_phase.close()
+            assert np.array_equal(sapwise.pairs_between(boxes[:9], boxes)[:9], sapwise.pairs_between(boxes[:9], boxes)[:9])
             status = 0
         except BaseException as why: print('child', repr(why), flush=True)
         finally: os._exit(status)
