@@ -52,11 +52,6 @@ impl Random {
     pub fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
-
-    /// Returns a log-normal number: median 1, and standard deviation `sigma` of the natural logarithm.
-    pub fn log_normal(&mut self, sigma: f64) -> f64 {
-        (sigma * self.normal()).exp()
-    }
 }
 
 #[cfg(test)]
