@@ -60,10 +60,7 @@ fn each_switch_is_an_event_with_its_reason() {
         }
     });
     let told = told.0.lock().unwrap();
-    assert!(
-        told.iter()
-            .all(|(level, target, _)| (*level, target.as_str()) == (Level::DEBUG, "sapwise::internals::adaptive"))
-    );
+    assert!(told.iter().all(|(level, target, _)| (*level, target.as_str()) == (Level::DEBUG, "sapwise::adaptive")));
     let messages: Vec<&str> = told.iter().map(|(_, _, message)| message.as_str()).collect();
     assert_eq!(messages.len(), 2, "{messages:?}");
     assert!(messages[0].starts_with("brute@cpu1, the cheapest in the first frame"), "{messages:?}");

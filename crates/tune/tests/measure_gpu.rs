@@ -90,7 +90,8 @@ fn a_gpu_that_is_not_there() {
     assert!(measure::gpu_group(&Gpus::none(), &[0, 1], &options(true)).is_err());
 }
 
-/// Prints the values of this machine: `cargo test -p sapwise-tune --features gpu --test measure_gpu -- --ignored --nocapture`.
+/// Prints the values of this machine:
+/// `cargo test -p sapwise-tune --features gpu --test measure_gpu -- --ignored --nocapture`.
 #[test]
 #[ignore = "takes seconds for each GPU"]
 fn the_whole_measurement() {
