@@ -113,7 +113,8 @@ fn a_gpu_that_lacks_a_parameter_costs_its_own_rows_only() {
     let (models, notes) = fitted(&all);
     assert_eq!(models.len(), truth().len() + gpu_truth().len());
     let told = |n: &String| n.contains("dispatch_ns") && n.contains("gpu1");
-    assert!(!notes.is_empty() && notes.iter().all(told), "{notes:?}");
+    // Of each method once on the GPU alone and once on both.
+    assert!(notes.len() == 2 * gpu_truth().len() && notes.iter().all(told), "{notes:?}");
 }
 
 #[test]
