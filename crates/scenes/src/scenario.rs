@@ -196,7 +196,18 @@ impl FromStr for Scenario {
 
 /// A text that names no [`Scenario`]. The message lists the names.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{text:?} is no scenario; use one of {}", Scenario::ALL.map(Scenario::name).join(", "))]
+#[error("{text:?} is no scenario; use one of {}", names())]
 pub struct UnknownScenario {
     text: String,
+}
+
+/// Returns all names with commas. Not by `join`, which LLVM 22 optimises for two minutes over so long a constant array.
+fn names() -> String {
+    let mut names = String::new();
+    for scenario in Scenario::ALL {
+        let comma = if names.is_empty() { "" } else { ", " };
+        names += comma;
+        names += scenario.name();
+    }
+    names
 }
