@@ -21,8 +21,8 @@ const FOREST: &str = "random forest";
 const NEAREST: &str = "nearest machine";
 const FULL_SWEEP: &str = "full sweep";
 
-/// The measured costs of profiles without one of their scenarios.
-type Partial = BTreeMap<(usize, String), Arc<Vec<AlgorithmCost>>>;
+/// The measured costs of profiles without one of their scenarios, when they are first needed.
+type Partial = BTreeMap<(usize, String), Arc<OnceLock<Vec<AlgorithmCost>>>>;
 
 /// What all folds share.
 pub(super) struct Material<'a> {
@@ -129,16 +129,17 @@ impl<'a> Material<'a> {
     }
 
     /// Returns the same without a scenario.
-    fn costs_without(&self, k: usize, scenario: &str) -> Arc<Vec<AlgorithmCost>> {
-        let key = (k, scenario.to_owned());
-        let known = self.partial.lock().unwrap_or_else(PoisonError::into_inner).get(&key).map(Arc::clone);
-        known.unwrap_or_else(|| {
+    fn costs_without(&self, k: usize, scenario: &str) -> Vec<AlgorithmCost> {
+        let mut partial = self.partial.lock().unwrap_or_else(PoisonError::into_inner);
+        let place = Arc::clone(partial.entry((k, scenario.to_owned())).or_default());
+        // Not held while one profile is fitted: the other threads fit others.
+        drop(partial);
+        let fit = || {
             let mut own = self.profiles[k].clone();
             own.points.retain(|s| s.scenario != scenario);
-            let costs = Arc::new(measured_costs(&own).0);
-            self.partial.lock().unwrap_or_else(PoisonError::into_inner).insert(key, Arc::clone(&costs));
-            costs
-        })
+            measured_costs(&own).0
+        };
+        place.get_or_init(fit).clone()
     }
 }
 
@@ -209,7 +210,7 @@ impl Fitted<'_> {
     ) -> Vec<Contestant<'b>> {
         let mut all = Vec::from(self.ours(&data.profiles[held], ours, available));
         let measured = |k: Option<usize>| match k.zip(self.without) {
-            Some((k, without)) => by_costs(data.costs_without(k, without).to_vec(), available),
+            Some((k, without)) => by_costs(data.costs_without(k, without), available),
             None => nothing(),
         };
         let nearest = baselines::nearest(&self.likeness, &data.likeness[held]).map(|k| self.known[k]);

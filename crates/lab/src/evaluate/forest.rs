@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 type Key = (BackendClass, String);
 
 /// Trees of a forest.
-const TREES: usize = 50;
+const TREES: usize = 25;
 /// Rows that a forest is grown from, at most.
 const MOST_ROWS: usize = 3000;
 /// Profiles that forests are grown from, about, and rows of each for a method, at least: from a handful of rows no
@@ -24,7 +24,7 @@ const MOST_ROWS: usize = 3000;
 const MOST_PROFILES: usize = 400;
 const FEWEST_OF_PROFILE: usize = 15;
 /// Rows in a leaf.
-const LEAF: usize = 2;
+const LEAF: usize = 8;
 /// Seed of the trees.
 const SEED: u64 = 1;
 

@@ -30,21 +30,20 @@ pub(crate) fn fit(called: &[Called]) -> Option<HelpersModel> {
     if called.is_empty() {
         return None;
     }
-    let error = |model: &HelpersModel| -> f64 {
-        let one = |c: &Called| {
+    // `None` once the sum exceeds `least`: most of what is tried is far worse.
+    let error = |model: &HelpersModel, least: f64| -> Option<f64> {
+        called.iter().try_fold(0.0, |sum, c| {
             let ns = model.with(c.figures, c.threads).cost_ns(c.objects, c.work_ns);
-            c.weight * (c.ns / ns).ln().abs()
-        };
-        called.iter().map(one).sum()
+            Some(sum + c.weight * (c.ns / ns).ln().abs()).filter(|sum| *sum < least)
+        })
     };
     let polished = |serial_share: f64| {
         let mut best = HelpersModel::new(500.0, 0.2, serial_share, 0);
-        let mut least = error(&best);
+        let mut least = error(&best, f64::INFINITY).unwrap_or(f64::INFINITY);
         for _ in 0..ROUNDS {
             let before = best;
             let mut attempt = |model: HelpersModel| {
-                let error = error(&model);
-                if error < least {
+                if let Some(error) = error(&model, least) {
                     (best, least) = (model, error);
                 }
             };
