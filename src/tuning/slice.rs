@@ -7,9 +7,10 @@ use crate::cost::Frame;
 /// Distance between two loads that are compared, as a logarithm of objects. A narrower field may be missed.
 const FINEST_LN: f64 = 0.03;
 
-/// An algorithm within this factor of the cheapest keeps its field: one thread and two that have nothing to divide
-/// run the same code, and chance decides which is cheaper.
+/// An algorithm within this factor of the cheapest keeps its field. The larger one is for numbers of threads of one
+/// method: one thread and two that have nothing to divide run the same code, and chance decides which is cheaper.
 const SAME: f64 = 1.02;
+const SAME_METHOD: f64 = 1.05;
 
 /// Halvings of a stretch of [`FINEST_LN`]: they find a crossover to a ten-thousandth.
 const HALVINGS: u32 = 8;
@@ -75,7 +76,14 @@ impl<'a> Slice<'a> {
     pub(super) fn steps(&self, costs: &[AlgorithmCost]) -> Vec<(Load, usize)> {
         let mut steps = Vec::new();
         let Some(first) = self.loads.first() else { return steps };
-        let Some((mut best, _)) = cheapest(costs, first) else { return steps };
+        let Some((cheapest_here, least)) = cheapest(costs, first) else { return steps };
+        // Of those that cost about the same the first, which has the fewest threads.
+        let holds = |best: usize, other: usize, load: &Load, least: f64| {
+            let same_method = costs[best].algorithm.method() == costs[other].algorithm.method();
+            costs[best].curve.cost_ns(load) <= if same_method { SAME_METHOD } else { SAME } * least
+        };
+        let same = |k: &usize| holds(*k, cheapest_here, first, least);
+        let mut best = (0..costs.len()).find(same).unwrap_or(cheapest_here);
         steps.push((*first, best));
         // Places since the last step, all of which belong to its algorithm.
         let mut held = vec![(0.0, *first)];
@@ -86,7 +94,7 @@ impl<'a> Slice<'a> {
                 let place = (k - 1) as f64 + f64::from(part) / f64::from(parts);
                 let load = self.load(place);
                 let Some((other, least)) = cheapest(costs, &load) else { return steps };
-                if costs[best].curve.cost_ns(&load) > SAME * least {
+                if !holds(best, other, &load, least) {
                     // Back to the last place at which the other one was not cheaper.
                     let not_cheaper = |load: &Load| costs[other].curve.cost_ns(load) >= costs[best].curve.cost_ns(load);
                     let from = held.iter().rposition(|(_, load)| not_cheaper(load)).unwrap_or(0);
