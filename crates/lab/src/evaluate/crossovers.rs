@@ -6,23 +6,37 @@ use crate::fit::{measured_slice, slice_tuning};
 use sapwise::algorithm::Load;
 use sapwise::tuning::{AlgorithmCost, Crossover, Source};
 use sapwise::{AlgorithmId, Tuning};
+use std::collections::BTreeSet;
 
-/// The crossovers of the measured tuning of one profile, in its usual scenario.
-#[derive(Debug, Clone, Default)]
+/// A crossover matters if the algorithm below it costs this many times the one above at [`BEYOND`] times its objects.
+const COSTS: f64 = 1.1;
+const BEYOND: f64 = 2.0;
+
+/// The crossovers of the measured tuning of one profile in one of its scenarios.
+#[derive(Debug, Clone)]
 pub(super) struct MeasuredCrossovers {
+    pub(super) scenario: String,
     loads: Vec<Load>,
     crossovers: Vec<Crossover>,
 }
 
 impl MeasuredCrossovers {
-    /// Derives them from the measured costs of the profile; none if it has too few sizes or timings.
-    pub(super) fn new(profile: &Profile, costs: &[AlgorithmCost]) -> Self {
-        let scenario = profile.usual_scenario();
-        let found = measured_slice(profile, scenario).and_then(|loads| {
-            let crossovers = slice_tuning(costs.to_vec(), scenario, &loads)?.crossovers;
-            Ok(Self { loads, crossovers })
+    /// Derives those that matter from the measured costs of the profile, for each scenario with enough sizes and
+    /// timings.
+    pub(super) fn of_scenarios(profile: &Profile, costs: &[AlgorithmCost]) -> Vec<Self> {
+        let scenarios: BTreeSet<&str> = profile.scenarios().collect();
+        scenarios.into_iter().filter_map(|scenario| Self::new(profile, scenario, costs)).collect()
+    }
+
+    fn new(profile: &Profile, scenario: &str, costs: &[AlgorithmCost]) -> Option<Self> {
+        let loads = measured_slice(profile, scenario).ok()?;
+        let mut crossovers = slice_tuning(costs.to_vec(), scenario, &loads).ok()?.crossovers;
+        let cost = |id: &AlgorithmId| costs.iter().find(|c| c.algorithm == *id);
+        crossovers.retain(|c| {
+            let sides = cost(&c.below).zip(cost(&c.above));
+            sides.is_some_and(|(below, above)| ln_ratio(&loads, BEYOND * c.objects, below, above) > COSTS.ln())
         });
-        found.unwrap_or_default()
+        Some(Self { scenario: scenario.to_owned(), loads, crossovers })
     }
 
     /// Returns for each crossover whose algorithms have predicted costs the nearest crossing of those costs in the
@@ -61,6 +75,21 @@ impl MeasuredCrossovers {
         let later = tuning.step(crossover.objects as u32).is_some_and(|s| s.algorithm == crossover.below);
         let end = if later { self.loads.last() } else { self.loads.first() };
         compared(end.map_or(crossover.objects, |load| f64::from(load.objects.max(1))), false)
+    }
+}
+
+/// Returns the logarithm of the cost of one algorithm over that of another at a number of objects, interpolated between
+/// the loads of a slice; beyond its end that at the end.
+fn ln_ratio(loads: &[Load], objects: f64, of: &AlgorithmCost, over: &AlgorithmCost) -> f64 {
+    let at = |load: &Load| (of.curve.cost_ns(load) / over.curve.cost_ns(load)).ln();
+    let above = loads.partition_point(|l| f64::from(l.objects) <= objects);
+    match (above.checked_sub(1).map(|k| &loads[k]), loads.get(above)) {
+        (Some(below), Some(above)) => {
+            let [a, x, b] = [f64::from(below.objects), objects, f64::from(above.objects)].map(|n| (n + 1.0).ln());
+            at(below) + (x - a) / (b - a) * (at(above) - at(below))
+        }
+        (Some(end), None) | (None, Some(end)) => at(end),
+        (None, None) => 0.0,
     }
 }
 
@@ -105,7 +134,7 @@ mod tests {
     fn the_measured_costs_have_no_error_and_wrong_ones_have_the_distance() {
         let profile = Profile::of("", &Machine::family()[2].report());
         let costs = measured_costs(&profile).0;
-        let crossovers = MeasuredCrossovers::new(&profile, &costs);
+        let crossovers = MeasuredCrossovers::new(&profile, "uniform", &costs).unwrap();
         assert!(!crossovers.crossovers.is_empty());
         assert!(crossovers.errors(&costs).iter().all(|e| *e < 0.03), "{:?}", crossovers.errors(&costs));
         let crossover = crossovers.crossovers[0].clone();
@@ -123,5 +152,23 @@ mod tests {
         let others: Vec<AlgorithmCost> =
             costs.iter().filter(|c| c.algorithm.method() != crossover.below.method()).cloned().collect();
         assert!(crossovers.errors(&others).len() < crossovers.crossovers.len());
+    }
+
+    #[test]
+    fn a_crossover_of_equals_does_not_matter() {
+        let profile = Profile::of("", &Machine::family()[2].report());
+        let costs = measured_costs(&profile).0;
+        let all = MeasuredCrossovers::of_scenarios(&profile, &costs);
+        assert_eq!(all.iter().map(|c| &c.scenario[..]).collect::<Vec<_>>(), ["clustered", "uniform"]);
+        let uniform = &all[1];
+        let crossover = &uniform.crossovers[0];
+        // The one above costs as much as the one below, and a little less from the crossover on.
+        let below = costs.iter().find(|c| c.algorithm == crossover.below).unwrap();
+        let above = AlgorithmCost::new(crossover.above.clone(), 1, below.curve.clone(), 0.0);
+        let found =
+            MeasuredCrossovers::new(&profile, "uniform", &slower(&[below.clone(), above], &crossover.above, 0.99));
+        assert_eq!(found.unwrap().crossovers, []);
+        let at = |objects: f64| ln_ratio(&uniform.loads, objects, below, &costs[0]);
+        assert!(at(1e12).is_finite() && at(0.0).is_finite() && ln_ratio(&[], 9.0, below, below) == 0.0);
     }
 }

@@ -32,6 +32,8 @@ pub struct HeldOut {
 pub struct HeldOutCrossover {
     /// The file of the profile.
     pub file: String,
+    /// The scenario of the frames.
+    pub scenario: String,
     /// Where it was measured, and where it was predicted.
     pub compared: ComparedCrossover,
 }

@@ -136,17 +136,21 @@ fn held_out(data: &Material<'_>, fitted: &Fitted<'_>, judged: &[usize]) -> Resul
         let available = profile.available();
         let contestants = fitted.contestants(data, held, ours.as_ref(), &available)?;
         let costs = ours.as_ref().map(|o| &o.whole[..]);
-        let measured = MeasuredCrossovers::new(profile, data.costs(held));
+        let measured = MeasuredCrossovers::of_scenarios(profile, data.costs(held));
         if let Some(costs) = costs {
             found.times.extend(Time::of(profile, costs));
-            let crossover = |compared| HeldOutCrossover { file: profile.file.clone(), compared };
-            found.crossovers.extend(measured.predicted(costs).into_iter().map(crossover));
+            for own in &measured {
+                let (file, scenario) = (&profile.file, &own.scenario);
+                let crossover =
+                    |compared| HeldOutCrossover { file: file.clone(), scenario: scenario.clone(), compared };
+                found.crossovers.extend(own.predicted(costs).into_iter().map(crossover));
+            }
         }
         let means = RegretTable::by_means(profile);
         let regret = |contestant: Contestant<'_>| {
             let regret = data.regret_table(held).regret(profile, &contestant.choose);
             let by_means = Some(means.regret(profile, &contestant.choose));
-            let crossings = contestant.costs.map(|costs| measured.errors(costs));
+            let crossings = contestant.costs.map(|costs| measured.iter().flat_map(|m| m.errors(costs)).collect());
             Judged { by_means, ..Judged::new(contestant.name, profile, regret, crossings) }
         };
         found.judged.extend(contestants.into_iter().map(regret));

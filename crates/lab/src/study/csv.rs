@@ -44,7 +44,10 @@ pub(super) fn crossovers(material: &Material) -> Result<String> {
             let alike = |c: &&crate::evaluate::ComparedCrossover| {
                 (&c.below, &c.above) == (&crossover.below, &crossover.above) && c.measured == crossover.objects
             };
-            let own = held_out.iter().filter(|h| h.file == profile.file).map(|h| &h.compared);
+            let usual = |h: &&crate::evaluate::HeldOutCrossover| {
+                h.file == profile.file && h.scenario == profile.usual_scenario()
+            };
+            let own = held_out.iter().filter(usual).map(|h| &h.compared);
             let predicted = own.clone().find(alike);
             rows.push(vec![
                 profile.file.clone(),
