@@ -30,7 +30,7 @@ pub struct CostCurve {
     pub work: Arc<Work>,
     /// Effect of several threads; `None` for one thread and for GPUs.
     pub helpers: Option<Helpers>,
-    /// Correction from frames that ran; `None` if none did.
+    /// Correction of that: what a prediction leaves unexplained on several threads, and what frames that ran showed.
     pub observed: Option<Residual>,
 }
 

@@ -90,6 +90,6 @@ const NAMES: [&str; 14] = [
     "uniform",
     "tuning/2",
     "tuning/2.7",
-    "model/3",
+    "model/4",
     "report/2",
 ];

@@ -80,13 +80,13 @@ struct CostFile {
     work: usize,
     /// The effect of several threads; null for one thread and for GPUs.
     helpers: Option<Helpers>,
-    /// Correction by frames that ran; null without any.
+    /// Correction of the whole: on several threads by what the model leaves unexplained, later by frames that ran.
     observed: Option<ObservedFile>,
     /// Standard deviation of the natural logarithm of measured over modelled time.
     spread_ln: f64,
 }
 
-/// The correction of a cost by frames that ran.
+/// The correction of a cost, on several threads and by frames that ran.
 #[derive(serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(rename = "Observed", deny_unknown_fields))]
 struct ObservedFile {

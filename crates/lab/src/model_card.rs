@@ -15,8 +15,9 @@ Predicts the time of each broad-phase algorithm from the hardware parameters of 
 `sapwise predict` derives which algorithm is fastest where. The time on one thread is a sum of physical terms with
 non-negative units: calls, objects, sorting, objects outside the cache, tests, pairs, motion. Each term scales with
 a parameter: clock, SIMD lanes or memory bandwidth. A Gaussian process over the load, the residual, multiplies the
-sum. `pair-cache` takes the smaller of its own sum and that of `bvh`. On several threads the work is divided by the
-speed-up, plus the calls of the helpers and what is lost while they wake up. All machines share these units.
+sum; machines of alike SIMD levels have alike residuals. `pair-cache` takes the smaller of its own sum and that of
+`bvh`. On several threads the work is divided by the speed-up, plus the calls of the helpers and what is lost while
+they wake up; this has a residual of its own. All machines share these units.
 
 Not for timing promises: a predicted time may be further off than the choice that follows from it.";
 
@@ -43,8 +44,9 @@ host counts the same. A choice that was not timed nearby is charged ten times th
 - **seen scenario**: only the host was held out. **least to largest**: of the hosts.
 - **one thread**, **several**: seen scenarios, by the threads of the report.
 - **by means**: judged by the mean over frames instead of the median, which includes rebuilds and interruptions.
-- **crossovers off by**: median distance between measured and predicted crossovers in `uniform`; an octave is a
-  factor of two in objects.
+- **crossovers off by**: median distance between measured and predicted crossovers of all scenarios; an octave is a
+  factor of two in objects, and *near* is within half of one. Counted if the algorithm below the crossover costs over
+  1.1 times the one above at twice the objects.
 - **over 10 %**: share of the cells in which the choice cost a tenth more than the best, or worse.
 - **floor**: the best of the same cell in a repeated run. **another run's full sweep** chooses by the costs of that
   run. Smaller differences say nothing.
@@ -172,7 +174,8 @@ pub fn scores(validation: &Validation, draw: impl Fn(&[Vec<String>]) -> String) 
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for m in methods {
         let seen = Regrets { all: m.mean_regret, in_games: m.mean_regret_in_games.unwrap_or_default() };
-        let octaves = m.crossing_error_octaves.map(|octaves| format!("{octaves:.2} octaves"));
+        let octaves = m.crossing_error_octaves.zip(m.crossings_within_half_octave);
+        let octaves = octaves.map(|(octaves, near)| format!("{octaves:.2} octaves, {:.0} % near", 100.0 * near));
         let range = m.regret_range().map(|[a, b]| format!("{:.1} to {:.1}", 100.0 * a, 100.0 * b));
         let or_none = |cell: Option<String>| cell.unwrap_or_else(|| "-".to_owned());
         rows.push(vec![
@@ -227,6 +230,7 @@ mod tests {
             closed_gap,
             mean_regret_in_games: Some(0.04),
             crossing_error_octaves: Some(0.25),
+            crossings_within_half_octave: Some(0.67),
             ..MethodScore::default()
         };
         let several = Split { all: Regrets { all: 0.02, in_games: 0.01 }, ..Split::default() };
@@ -244,7 +248,7 @@ mod tests {
             text.contains("1 physical machine of 1 CPU model in 2 profiles") && text.contains("says little"),
             "{text}"
         );
-        let row = "| physics | - | 5.0 % (4.0) | 0.4 to 30.0 | - | - | - | 0.25 octaves | 0.0 % |";
+        let row = "| physics | - | 5.0 % (4.0) | 0.4 to 30.0 | - | - | - | 0.25 octaves, 67 % near | 0.0 % |";
         assert!(text.contains(row) && text.contains("| floor, 1 pair | - | 2.0 % (1.0) |"), "{text}");
         validation.methods.clear();
         assert_eq!(scores(&validation, columns), "1 physical machine of 1 CPU model in 2 profiles; not validated.\n");

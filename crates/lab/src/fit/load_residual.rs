@@ -1,42 +1,57 @@
-//! The part of a time that the physical terms leave unexplained, as a function of the load: a Gaussian process with
-//! inducing points.
+//! The part of a time that the model leaves unexplained, as a function of the load: a Gaussian process with inducing
+//! points for each group of timings, with the covariance of [`GroupResidual`] between groups.
 
 use crate::data::Profile;
 use anyhow::{Context, Result};
-use linfa_linalg::cholesky::SolveCInplace;
-use ndarray::{Array1, Array2, Axis};
+use linfa_linalg::cholesky::{Cholesky, InverseC};
+use linfa_linalg::triangular::{SolveTriangular, UPLO};
+use ndarray::{Array1, Array2, Axis, ShapeBuilder};
 use sapwise::algorithm::Load;
 use sapwise::internals::Places;
+use sapwise::internals::stats::robust_deviation;
 use sapwise_scenes::Random;
+use sapwise_tune::model::GroupResidual;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Standard deviation of a residual, and of a timing around it, as natural logarithms. Half or twice as much changes
-/// no regret noticeably.
-const DEVIATION_LN: f64 = 0.2;
-const NOISE_LN: f64 = 0.08;
+/// Standard deviation of what the groups of one machine have in common beside what all groups have, in natural
+/// logarithms. No parameter shows it, so that a new machine gets nothing of it.
+const MACHINE_LN: f64 = 0.1;
+/// Standard deviation of a timing around its residual, in natural logarithms. A third more changes no regret
+/// noticeably.
+const NOISE_LN: f64 = 0.12;
 /// Time over the best of the point from which on a timing counts no less for lying further behind.
 const MOST_BEHIND: f64 = 4.0;
 /// Variance that each place has of its own, as a share. It keeps the weights of neighbouring places from growing
-/// against each other.
+/// against each other. Likewise for groups.
 const JITTER: f64 = 1e-4;
+const GROUP_JITTER: f64 = 1e-6;
+/// Steps of a weight within one: finer ones change no cost, and would double the file of a model.
+const PER_WEIGHT: f64 = 1e6;
+/// Groups of one machine within a length of positions.
+const PER_LENGTH: f64 = 4.0;
 /// Loads among which places are chosen, at most.
 const MOST_LOADS: usize = 1500;
-/// Timings that a residual is fitted to, at most.
-const MOST_ROWS: usize = 2000;
 /// A remainder beyond this many robust standard deviations, and beyond this logarithm, is cut to that: a disturbed
 /// measurement, or what no smooth residual can follow.
 const REACH: f64 = 3.0;
 const LEAST_REACH_LN: f64 = 0.6;
+/// Steps of the solver, at most, and the length of the error over that of the right side at which it ends.
+const MOST_STEPS: usize = 500;
+const SOLVED: f64 = 1e-4;
 
 /// One timing, for a residual.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct Remainder {
     pub(crate) load: Load,
     /// Natural logarithm of measured over modelled time.
     pub(crate) ln: f64,
     /// Time over the best of the point.
     pub(crate) behind: f64,
+    /// Number of the physical machine.
+    pub(crate) machine: usize,
+    /// Position of the group, as in [`GroupResidual::at`].
+    pub(crate) at: Vec<f64>,
 }
 
 /// Returns the standard deviation of the logarithm of a timing around its residual, from its time over the best of
@@ -81,33 +96,112 @@ pub(crate) fn places<'a>(profiles: impl Iterator<Item = &'a Profile>, without: O
     Arc::new(Places::new(chosen))
 }
 
-/// Returns the most likely weights of the places for these remainders.
+/// Returns the most likely residual of each position at which there are timings.
+///
+/// Timings of one machine form a group if their positions are equal when rounded to a quarter. Minimises `sum (y - K w)^2 / noise^2` plus the prior of all
+/// groups together, by conjugate gradients with the blocks of the groups as preconditioner.
 ///
 /// # Errors
-/// When the system can't be solved.
-pub(crate) fn weights(places: &Places, remainders: &[Remainder], by_motion: bool) -> Result<Vec<f64>> {
-    let some = Random::named(1, &["rows"]).shuffled(remainders.len());
-    let rows: Vec<&Remainder> = some.into_iter().take(MOST_ROWS).map(|k| &remainders[k]).collect();
-    let spread =
-        sapwise::internals::stats::robust_deviation(&rows.iter().map(|r| r.ln).collect::<Vec<f64>>()).unwrap_or(0.0);
+/// When a system can't be solved.
+pub(crate) fn residual(places: &Places, remainders: &[Remainder], by_motion: bool) -> Result<Vec<GroupResidual>> {
+    let spread = robust_deviation(&remainders.iter().map(|r| r.ln).collect::<Vec<f64>>()).unwrap_or(0.0);
     let reach = (REACH * spread).max(LEAST_REACH_LN);
-    let count = places.loads().len();
-    let mut likeness = Array2::zeros((rows.len(), count));
-    for (row, r) in likeness.rows_mut().into_iter().zip(&rows) {
-        row.into_iter().zip(places.likeness(&r.load, by_motion)).for_each(|(to, k)| *to = k);
+    let key = |r: &Remainder| (r.at.iter().map(|x| (x * PER_LENGTH).round() as i64).collect(), r.machine);
+    let mut groups: BTreeMap<(Vec<i64>, usize), Vec<&Remainder>> = BTreeMap::new();
+    remainders.iter().for_each(|r| groups.entry(key(r)).or_default().push(r));
+    let at: Vec<Vec<f64>> =
+        groups.keys().map(|(key, _)| key.iter().map(|k| *k as f64 / PER_LENGTH).collect()).collect();
+    let groups: Vec<Vec<&Remainder>> = groups.into_values().collect();
+    if groups.is_empty() {
+        return Ok(Vec::new());
     }
-    let precision = Array1::from_iter(rows.iter().map(|r| noise_ln(r.behind).powi(-2)));
-    let targets = Array1::from_iter(rows.iter().map(|r| r.ln.clamp(-reach, reach)));
+    let unsolved = "the residual over the load can't be solved";
+    let count = places.loads().len();
     let mut between = Array2::zeros((count, count));
     for (mut row, load) in between.rows_mut().into_iter().zip(places.loads()) {
         row.assign(&Array1::from(places.likeness(load, by_motion)));
     }
-    between += &(JITTER * Array2::<f64>::eye(count));
-    let weighted = &likeness * &precision.insert_axis(Axis(1));
-    let mut normal = weighted.t().dot(&likeness) + between / DEVIATION_LN.powi(2);
-    let right = weighted.t().dot(&targets).insert_axis(Axis(1));
-    let weights = normal.solvec_into(right).context("the residual over the load can't be solved")?;
-    Ok(weights.remove_axis(Axis(1)).to_vec())
+    let root = (between + JITTER * Array2::<f64>::eye(count)).cholesky().context(unsolved)?;
+    let whiten = root.solve_triangular(&by_columns(count), UPLO::Lower).context(unsolved)?;
+    let mut blocks = Vec::new();
+    let mut right = Array2::zeros((groups.len(), count));
+    for (group, mut right) in groups.iter().zip(right.rows_mut()) {
+        let mut likeness = Array2::zeros((group.len(), count));
+        for (row, r) in likeness.rows_mut().into_iter().zip(group) {
+            row.into_iter().zip(places.likeness(&r.load, by_motion)).for_each(|(to, k)| *to = k);
+        }
+        let precision = Array1::from_iter(group.iter().map(|r| noise_ln(r.behind).powi(-2)));
+        let targets = Array1::from_iter(group.iter().map(|r| r.ln.clamp(-reach, reach)));
+        let weighted = &likeness * &precision.insert_axis(Axis(1));
+        // In coordinates in which the prior of a group is a unit matrix.
+        blocks.push(whiten.dot(&weighted.t().dot(&likeness)).dot(&whiten.t()));
+        right.assign(&whiten.dot(&weighted.t().dot(&targets)));
+    }
+    // Of one machine alone, what is special about it can't be told from what all have.
+    let several = groups.iter().any(|g| g[0].machine != groups[0][0].machine);
+    let covariance = Array2::from_shape_fn((groups.len(), groups.len()), |(a, b)| {
+        let [first, second] = [a, b].map(|k| groups[k][0].machine);
+        let of_machine = if several && first == second { MACHINE_LN.powi(2) } else { 0.0 };
+        let own = if a == b { GROUP_JITTER } else { 0.0 };
+        GroupResidual::covariance(&at[a], &at[b]) + of_machine + own
+    });
+    let inverse = covariance.invc().context(unsolved)?;
+    let solved = inverse.dot(&solved(&inverse, &blocks, &right).context(unsolved)?);
+    let weights = solved.dot(&whiten).mapv(|w| (w * PER_WEIGHT).round() / PER_WEIGHT);
+    // What was special about a machine is dropped: groups at one position count by their sum.
+    let mut residual: Vec<GroupResidual> = Vec::new();
+    for (at, weights) in at.into_iter().zip(weights.rows()) {
+        match residual.iter_mut().find(|known| known.at == at) {
+            Some(known) => known.weights.iter_mut().zip(weights).for_each(|(sum, w)| *sum += w),
+            None => residual.push(GroupResidual { at, weights: weights.to_vec() }),
+        }
+    }
+    Ok(residual)
+}
+
+/// Returns a unit matrix that lies in memory column by column: a triangular system is solved four times as fast for it.
+fn by_columns(count: usize) -> Array2<f64> {
+    let mut unit = Array2::zeros((count, count).f());
+    unit.diag_mut().fill(1.0);
+    unit
+}
+
+/// Solves `inverse u + block_g u_g = right` for all groups together, one group a row.
+fn solved(inverse: &Array2<f64>, blocks: &[Array2<f64>], right: &Array2<f64>) -> linfa_linalg::Result<Array2<f64>> {
+    let mut of_blocks = Vec::new();
+    for (k, block) in blocks.iter().enumerate() {
+        let root = (block + inverse[[k, k]] * Array2::<f64>::eye(block.nrows())).cholesky()?;
+        let half = root.solve_triangular(&by_columns(block.nrows()), UPLO::Lower)?;
+        of_blocks.push(half.t().dot(&half));
+    }
+    let by_group = |matrices: &[Array2<f64>], x: &Array2<f64>| {
+        let mut out = Array2::zeros(x.raw_dim());
+        for ((mut out, x), m) in out.rows_mut().into_iter().zip(x.rows()).zip(matrices) {
+            out.assign(&m.dot(&x));
+        }
+        out
+    };
+    let dot = |a: &Array2<f64>, b: &Array2<f64>| (a * b).sum();
+    let mut x = Array2::zeros(right.raw_dim());
+    let mut left = right.clone();
+    let mut ahead = by_group(&of_blocks, &left);
+    let mut step = ahead.clone();
+    let mut gain = dot(&left, &ahead);
+    let enough = SOLVED * dot(right, right).sqrt();
+    for _ in 0..MOST_STEPS {
+        if dot(&left, &left).sqrt() <= enough {
+            break;
+        }
+        let image = inverse.dot(&step) + by_group(blocks, &step);
+        let length = gain / dot(&step, &image);
+        x.scaled_add(length, &step);
+        left.scaled_add(-length, &image);
+        ahead = by_group(&of_blocks, &left);
+        let next = dot(&left, &ahead);
+        step = &ahead + &(next / gain * step);
+        gain = next;
+    }
+    Ok(x)
 }
 
 #[cfg(test)]
@@ -141,9 +235,13 @@ mod tests {
         let truth = |l: &Load| {
             0.3 * (f64::from(l.objects).log2() / 4.0).sin() + 0.1 * (l.pairs / f64::from(l.objects)).min(1.0)
         };
-        let remainder = |s: &Spot| Remainder { load: s.load, ln: truth(&s.load), behind: 1.0 };
+        let remainder =
+            |s: &Spot| Remainder { load: s.load, ln: truth(&s.load), behind: 1.0, machine: 0, at: vec![2.0] };
         let mut remainders: Vec<Remainder> = all[0].points.iter().map(remainder).collect();
-        let residual = |r: &[Remainder]| Residual::new(Arc::clone(&found), weights(&found, r, false).unwrap(), false);
+        let residual = |r: &[Remainder]| {
+            let groups = residual(&found, r, false).unwrap();
+            Residual::new(Arc::clone(&found), GroupResidual::weights_at(&groups, &[2.0]), false)
+        };
         let worst = |residual: &Residual| {
             let off = all[0].points.iter().map(|s| (residual.ln(&s.load) - truth(&s.load)).abs());
             off.fold(0.0, f64::max)
@@ -156,6 +254,6 @@ mod tests {
     #[test]
     fn without_rows_nothing_is_corrected() {
         let found = places(profiles().iter(), None);
-        assert!(weights(&found, &[], true).unwrap().iter().all(|w| *w == 0.0));
+        assert_eq!(residual(&found, &[], true).unwrap(), []);
     }
 }

@@ -110,7 +110,7 @@ impl Format {
     pub const TUNING: Self = Self::new("tuning", 2);
 
     /// Files of models, without the notes of their training.
-    pub const MODEL: Self = Self::new("model", 3).skipping(&["training"]);
+    pub const MODEL: Self = Self::new("model", 4).skipping(&["training"]);
 
     /// A kind of file in the major version that the caller reads and writes.
     #[must_use]

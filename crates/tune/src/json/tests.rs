@@ -33,7 +33,7 @@ fn an_unknown_key_is_an_error_and_in_a_newer_minor_version_it_is_listed() {
 
 #[test]
 fn another_schema_is_refused_by_name() {
-    for other in ["fields/1", "model/3", "tuning/1", "tuning/3", "tuning", "tuning/+2", "tuning/2.x", ""] {
+    for other in ["fields/1", "model/4", "tuning/1", "tuning/3", "tuning", "tuning/+2", "tuning/2.x", ""] {
         let mut file = sample();
         file["schema"] = json!(other);
         let error = tuning(&file.to_string()).unwrap_err();

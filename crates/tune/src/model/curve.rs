@@ -1,7 +1,7 @@
 //! The cost of a method on a machine.
 
 use super::needed::needed;
-use super::{MethodModel, PredictError};
+use super::{GroupResidual, MethodModel, PredictError};
 use crate::hardware::{Hardware, ParameterId};
 use sapwise::algorithm::{Backend, BackendClass};
 use sapwise::internals::{Fallback, Work};
@@ -31,8 +31,11 @@ impl MethodModel {
                 None => terms.push(CostTerm::new(t.term, unit_ns)),
             }
         }
-        let residual = (!self.residual.is_empty())
-            .then(|| Residual::new(Arc::clone(places), self.residual.clone(), self.residual_by_motion));
+        let at = match self.backend {
+            BackendClass::Cpu if !self.residual.is_empty() => GroupResidual::of_one_thread(hardware)?,
+            _ => Vec::new(),
+        };
+        let residual = self.residual_at(&self.residual, &at, places);
         let work = Work {
             terms,
             fallback,
@@ -46,16 +49,31 @@ impl MethodModel {
         work.defect().map_or(Ok(work), |e| Err(PredictError::Curve(e)))
     }
 
-    /// Returns the cost curve of this method on a backend of a machine, with its cost on one thread or on GPUs.
+    /// Returns the cost curve of this method on a backend of a machine, with its cost on one thread or on GPUs and
+    /// the places of its model.
     ///
     /// # Errors
     /// Names the hardware parameter that is missing, or what is wrong with the curve.
-    pub fn curve(&self, work: Arc<Work>, hardware: &Hardware, backend: &Backend) -> Result<CostCurve, PredictError> {
+    pub fn curve(
+        &self,
+        work: Arc<Work>,
+        hardware: &Hardware,
+        backend: &Backend,
+        places: &Arc<Places>,
+    ) -> Result<CostCurve, PredictError> {
         let mut curve = CostCurve::of(work);
-        if let Backend::Cpu(threads) = backend {
-            curve.helpers = self.helpers.unwrap_or(UNSEEN).on(hardware, *threads)?;
+        if let Backend::Cpu(threads @ 2..) = *backend {
+            curve.helpers = self.helpers.unwrap_or(UNSEEN).on(hardware, threads)?;
+            let at = GroupResidual::of_threads(hardware, threads)?;
+            curve.observed = self.residual_at(&self.thread_residual, &at, places);
         }
         curve.defect().map_or(Ok(curve), |e| Err(PredictError::Curve(e)))
+    }
+
+    /// Returns a residual of this method at a position of groups; `None` without groups.
+    fn residual_at(&self, groups: &[GroupResidual], at: &[f64], places: &Arc<Places>) -> Option<Residual> {
+        let weights = GroupResidual::weights_at(groups, at);
+        (!weights.is_empty()).then(|| Residual::new(Arc::clone(places), weights, self.residual_by_motion))
     }
 }
 

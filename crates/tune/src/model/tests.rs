@@ -57,6 +57,7 @@ fn method(backend: BackendClass, scale: Scale) -> MethodModel {
         residual: Vec::new(),
         residual_by_motion: false,
         helpers: None,
+        thread_residual: Vec::new(),
         spread_ln: 0.1,
     }
 }
