@@ -146,28 +146,15 @@ pub struct MethodScore {
     /// The same on the others.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub several_threads: Option<Regrets>,
-    /// 95th percentile over held-out reports of their mean regret.
-    pub p95_regret: f64,
     /// Share of all cells with a regret over 10 %.
     pub share_over_10_percent: f64,
-    /// How much of the gap between the best single algorithm (0) and the best choice (1) it closes.
-    pub closed_gap: f64,
     /// Mean regret weighted as in games, which is an assumption: log-normal around 800 objects, two thirds of the
     /// frames between 220 and 2800.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mean_regret_in_games: Option<f64>,
-    /// Least of the same of a held-out machine or report.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub least_regret_in_games: Option<f64>,
-    /// Largest of the same.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub largest_regret_in_games: Option<f64>,
-    /// 95th percentile over held-out reports of the same.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub p95_regret_in_games: Option<f64>,
     /// Median distance between measured and predicted crossovers that matter, in octaves, over all scenarios: those
-    /// beyond which the algorithm below costs over 1.1 times the one above at twice the objects. If the predicted costs don't cross
-    /// within the measured sizes, the distance to the end beyond which they would, a lower bound. `None` for a
+    /// whose algorithm below costs over 1.1 times the one above at twice the objects. If the predicted costs don't
+    /// cross within the measured sizes, the distance to the end beyond which they would, a lower bound. `None` for a
     /// strategy that predicts no costs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crossing_error_octaves: Option<f64>,
@@ -181,12 +168,6 @@ impl MethodScore {
     #[must_use]
     pub fn regret_range(&self) -> Option<[f64; 2]> {
         Some([self.least_regret?, self.largest_regret?])
-    }
-
-    /// Returns the same, weighted as in games.
-    #[must_use]
-    pub fn regret_range_in_games(&self) -> Option<[f64; 2]> {
-        Some([self.least_regret_in_games?, self.largest_regret_in_games?])
     }
 }
 
@@ -230,8 +211,7 @@ impl Training {
 }
 
 /// The training in the file of a model, whose other keys are the model's.
-const TRAINING: Format =
-    Format::new("model", 4).skipping(&["name", "simulated", "ranges", "ratios_90_ln", "places", "methods"]);
+const TRAINING: Format = Format::new("model", 4).skipping(&["name", "ranges", "ratios_90_ln", "places", "methods"]);
 
 /// Reads the file of a model.
 ///

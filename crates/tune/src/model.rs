@@ -37,9 +37,6 @@ pub const GPU_PREFIX: &str = "gpu/";
 pub struct Model {
     /// Name by which tuning refers to it.
     pub name: String,
-    /// Whether a report behind it is simulated, so that its predictions are no evidence.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub simulated: bool,
     /// Lowest and highest value of each hardware parameter in training; a machine outside is extrapolated.
     pub ranges: Vec<Range>,
     /// On held-out machines nine of ten ratios of the times of two algorithms were within a factor of e to this of
@@ -178,14 +175,7 @@ impl Model {
     /// Creates a model of these methods from the ranges of its training.
     #[must_use]
     pub fn new(name: impl Into<String>, methods: Vec<MethodModel>, ranges: Vec<Range>) -> Self {
-        Self {
-            name: name.into(),
-            simulated: false,
-            ranges,
-            ratios_90_ln: None,
-            places: Arc::new(Places::new(Vec::new())),
-            methods,
-        }
+        Self { name: name.into(), ranges, ratios_90_ln: None, places: Arc::new(Places::new(Vec::new())), methods }
     }
 
     /// Sets [`ratios_90_ln`](Self::ratios_90_ln).

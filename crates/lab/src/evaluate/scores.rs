@@ -55,12 +55,7 @@ impl Judged {
 
 /// Scores every strategy. Every physical machine counts the same; its profiles share its weight.
 pub(super) fn scores(all: &[Judged], by_machine: bool) -> Vec<MethodScore> {
-    let mut score: Vec<MethodScore> = names(all).into_iter().map(|name| score(all, name, by_machine)).collect();
-    let single = score.iter().find(|s| s.name == SINGLE_BEST).map_or(0.0, |s| s.mean_regret);
-    // Without a regret of the single best there is no gap to close.
-    let gap = |regret: f64| if single > 0.0 { (single - regret) / single } else { 0.0 };
-    score.iter_mut().for_each(|s| s.closed_gap = gap(s.mean_regret));
-    score
+    names(all).into_iter().map(|name| score(all, name, by_machine)).collect()
 }
 
 /// Returns for each strategy, in the order of the first profile, the mean regret on each held-out machine, or on each
@@ -102,7 +97,6 @@ fn score(all: &[Judged], name: &str, by_machine: bool) -> MethodScore {
         own.iter().map(|j| j.crossings.as_deref()).collect::<Option<Vec<_>>>().map(|c| c.concat());
     let near = |c: &Vec<f64>| c.iter().filter(|e| **e <= NEAR_OCTAVES).count() as f64 / c.len() as f64;
     let ends = range(&of_units(all, name, by_machine, |r| r.mean));
-    let ends_in_games = range(&of_units(all, name, by_machine, |r| r.as_in_games));
     let seen = split(&of(&own, |j| Some(&j.regret)));
     MethodScore {
         name: name.to_owned(),
@@ -113,13 +107,8 @@ fn score(all: &[Judged], name: &str, by_machine: bool) -> MethodScore {
         by_means: split(&of(&own, |j| j.by_means.as_ref())).map(|s| s.all),
         one_thread: seen.and_then(|s| s.one_thread),
         several_threads: seen.and_then(|s| s.several_threads),
-        p95_regret: percentile_95(means),
         share_over_10_percent: mean(&weighted(&over)),
-        closed_gap: 0.0,
         mean_regret_in_games: Some(mean(&in_games)),
-        least_regret_in_games: ends_in_games.map(|e| e[0]),
-        largest_regret_in_games: ends_in_games.map(|e| e[1]),
-        p95_regret_in_games: Some(percentile_95(in_games)),
         crossing_error_octaves: crossings.as_deref().and_then(median),
         crossings_within_half_octave: crossings.as_ref().filter(|c| !c.is_empty()).map(near),
     }
@@ -164,17 +153,6 @@ fn mean(values: &[(f64, f64)]) -> f64 {
     values.iter().map(|v| v.0 * v.1).sum::<f64>() / total
 }
 
-/// Returns the least value that 95 % of the weight do not exceed.
-fn percentile_95(mut values: Vec<(f64, f64)>) -> f64 {
-    values.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut left = 0.95 * values.iter().map(|v| v.1).sum::<f64>() - 1e-9;
-    let reached = |&&(_, weight): &&(f64, f64)| {
-        left -= weight;
-        left <= 0.0
-    };
-    values.iter().find(reached).map_or(0.0, |v| v.0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -201,27 +179,17 @@ mod tests {
         all.push(judged("ours", "a", 0.1));
         let scores = scores(&all, true);
         let ours = scores.iter().find(|s| s.name == "ours").unwrap();
-        assert!((ours.mean_regret - 0.155).abs() < 1e-12 && ours.p95_regret == 0.3, "{ours:?}");
-        assert!(
-            (ours.closed_gap - 0.845).abs() < 1e-12 && (ours.share_over_10_percent - 0.275).abs() < 1e-12,
-            "{ours:?}"
-        );
-        assert!((ours.mean_regret_in_games.unwrap() - 0.0775).abs() < 1e-12 && ours.p95_regret_in_games == Some(0.15));
+        assert!((ours.mean_regret - 0.155).abs() < 1e-12, "{ours:?}");
+        assert!((ours.share_over_10_percent - 0.275).abs() < 1e-12, "{ours:?}");
+        assert!((ours.mean_regret_in_games.unwrap() - 0.0775).abs() < 1e-12);
         // Only "b" has several threads.
         assert_eq!((ours.one_thread.map(|r| r.all), ours.several_threads.map(|r| r.all)), (Some(0.01), Some(0.3)));
         assert_eq!(ours.unseen_scenario, None);
         // The range over machines holds the mean.
         assert_eq!((ours.least_regret.map(|r| (100.0 * r).round()), ours.largest_regret), (Some(1.0), Some(0.3)));
-        assert_eq!(ours.regret_range_in_games().map(|r| r[1]), Some(0.15));
         // Eleven crossovers are one octave off, of the others one is 0.3, one 0.1 and nine are exact.
         assert!((ours.crossing_error_octaves.unwrap() - 0.65).abs() < 1e-12);
         assert_eq!(ours.crossings_within_half_octave, Some(0.5));
         assert_eq!(scores.iter().find(|s| s.name == SINGLE_BEST).unwrap().crossing_error_octaves, None);
-    }
-
-    #[test]
-    fn the_percentile_of_twenty_is_the_nineteenth() {
-        let of = |n: usize| percentile_95((1..=n).rev().map(|k| (k as f64, 1.0)).collect());
-        assert_eq!((of(20), of(7), of(1)), (19.0, 7.0, 1.0));
     }
 }

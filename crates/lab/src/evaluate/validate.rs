@@ -4,7 +4,7 @@ use super::contestants::{Contestant, Fitted, Material};
 use super::coverage::{Errors, coverage};
 use super::crossovers::MeasuredCrossovers;
 use super::floor::floor;
-use super::held_out::{HeldOut, HeldOutCrossover, Time};
+use super::held_out::{HeldOut, HeldOutCrossover};
 use super::partition::Partition;
 use super::regret_table::{Regret, RegretTable};
 use super::scores::{self, Judged};
@@ -48,7 +48,7 @@ pub fn validate(
 ) -> Result<Validated> {
     let mut notes = Vec::new();
     let mut all: Vec<Judged> = Vec::new();
-    let (mut times, mut crossovers, mut chance, mut covered) = (Vec::new(), Vec::new(), None, None);
+    let (mut crossovers, mut chance, mut covered) = (Vec::new(), None, None);
     progress.start(partition.folds.len() as u64);
     progress.message("validating");
     if profiles.len() < 2 {
@@ -80,7 +80,6 @@ pub fn validate(
         let mut errors = Vec::new();
         for found in partition.folds.par_iter().map(fold).collect::<Result<Vec<Found>>>()? {
             all.extend(found.judged);
-            times.extend(found.times);
             crossovers.extend(found.crossovers);
             notes.extend(found.notes);
             errors.extend(found.errors);
@@ -111,7 +110,7 @@ pub fn validate(
         floor: chance,
         coverage: covered,
     };
-    Ok(Validated { validation, notes, held_out: HeldOut::new(&all, times, crossovers, partition.by_machine) })
+    Ok(Validated { validation, notes, held_out: HeldOut::new(&all, crossovers, partition.by_machine) })
 }
 
 /// The results on one fold.
@@ -119,7 +118,6 @@ pub fn validate(
 struct Found {
     judged: Vec<Judged>,
     errors: Vec<Errors>,
-    times: Vec<Time>,
     crossovers: Vec<HeldOutCrossover>,
     notes: Vec<String>,
 }
@@ -138,7 +136,6 @@ fn held_out(data: &Material<'_>, fitted: &Fitted<'_>, judged: &[usize]) -> Resul
         let costs = ours.as_ref().map(|o| &o.whole[..]);
         let measured = MeasuredCrossovers::of_scenarios(profile, data.costs(held));
         if let Some(costs) = costs {
-            found.times.extend(Time::of(profile, costs));
             for own in &measured {
                 let (file, scenario) = (&profile.file, &own.scenario);
                 let crossover =

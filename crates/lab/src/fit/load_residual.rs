@@ -98,8 +98,9 @@ pub(crate) fn places<'a>(profiles: impl Iterator<Item = &'a Profile>, without: O
 
 /// Returns the most likely residual of each position at which there are timings.
 ///
-/// Timings of one machine form a group if their positions are equal when rounded to a quarter. Minimises `sum (y - K w)^2 / noise^2` plus the prior of all
-/// groups together, by conjugate gradients with the blocks of the groups as preconditioner.
+/// Timings of one machine form a group if their positions are equal when rounded to a quarter. Minimises
+/// `sum (y - K w)^2 / noise^2` plus the prior of all groups together, by conjugate gradients with the blocks of the
+/// groups as preconditioner.
 ///
 /// # Errors
 /// When a system can't be solved.

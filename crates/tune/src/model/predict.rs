@@ -60,13 +60,6 @@ impl Model {
             model: self.name.clone(),
             ratios_90_ln: self.ratios_90_ln,
         };
-        if self.simulated {
-            p.warnings.push(format!(
-                "the model {} was trained on simulated machines: what it predicts is no evidence; train on real \
-                 reports",
-                self.name
-            ));
-        }
         let mut unlike = p
             .outside(self.ranges.iter().filter_map(|r| r.excess(&r.parameter, "", hardware.value_named(&r.parameter))));
         if self.ranges.is_empty() {

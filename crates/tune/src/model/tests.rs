@@ -66,7 +66,6 @@ fn model(methods: Vec<MethodModel>) -> Model {
     let range = |parameter: &str| Range { parameter: parameter.to_owned(), min: 1.0, max: 100.0 };
     Model {
         name: "test".to_owned(),
-        simulated: false,
         ranges: vec![
             range(ParameterId::ClockMeasuredGhz.as_str()),
             range("gpu/upload_gb_per_s"),
