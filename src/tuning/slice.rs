@@ -230,6 +230,22 @@ mod tests {
     }
 
     #[test]
+    fn the_fewest_threads_win_a_tie_of_one_method() {
+        let cost = |id: &str, ns: f64| {
+            AlgorithmCost::new(id.parse().unwrap(), 1, CostCurve::new(vec![CostTerm::new(Term::Call, ns)]), 0.0)
+        };
+        let loads = [10, 1000].map(Load::of_objects);
+        let first = |costs: &[AlgorithmCost]| {
+            let steps = Slice::new(&loads).steps(costs);
+            assert_eq!(steps.len(), 1);
+            costs[steps[0].1].algorithm.to_string()
+        };
+        assert_eq!(first(&[cost("sap@cpu1", 100.0), cost("sap@cpu2", 96.0)]), "sap@cpu1");
+        assert_eq!(first(&[cost("sap@cpu1", 100.0), cost("sap@cpu2", 94.0)]), "sap@cpu2");
+        assert_eq!(first(&[cost("sap@cpu1", 100.0), cost("bvh@cpu1", 96.0)]), "bvh@cpu1");
+    }
+
+    #[test]
     fn reach_ends_at_its_condition_or_at_the_end() {
         let loads: Vec<Load> = (1..=20).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
         let slice = Slice::new(&loads);

@@ -30,7 +30,7 @@ pub(crate) fn fit(called: &[Called]) -> Option<HelpersModel> {
     if called.is_empty() {
         return None;
     }
-    // `None` once the sum exceeds `least`: most of what is tried is far worse.
+    // `None` once the sum reaches `least`.
     let error = |model: &HelpersModel, least: f64| -> Option<f64> {
         called.iter().try_fold(0.0, |sum, c| {
             let ns = model.with(c.figures, c.threads).cost_ns(c.objects, c.work_ns);

@@ -26,7 +26,7 @@ const MOST_BEHIND: f64 = 4.0;
 /// against each other. Likewise for groups.
 const JITTER: f64 = 1e-4;
 const GROUP_JITTER: f64 = 1e-6;
-/// Steps of a weight within one: finer ones change no cost, and would double the file of a model.
+/// Steps of a weight within one: finer ones would only lengthen the file of a model.
 const PER_WEIGHT: f64 = 1e6;
 /// Groups of one machine within a length of positions.
 const PER_LENGTH: f64 = 4.0;
@@ -160,7 +160,7 @@ pub(crate) fn residual(places: &Places, remainders: &[Remainder], by_motion: boo
     Ok(residual)
 }
 
-/// Returns a unit matrix that lies in memory column by column: a triangular system is solved four times as fast for it.
+/// Returns a unit matrix that lies in memory column by column, in which the triangular solver walks through it.
 fn by_columns(count: usize) -> Array2<f64> {
     let mut unit = Array2::zeros((count, count).f());
     unit.diag_mut().fill(1.0);

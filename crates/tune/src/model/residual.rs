@@ -8,8 +8,8 @@ use super::PredictError;
 use super::needed::needed;
 use crate::hardware::{Hardware, ParameterId};
 
-/// Standard deviation that all groups share, and that alike groups share, as natural logarithms. Chosen with hosts
-/// held out; half or twice as much changes regrets by less than two fits of the same reports differ.
+/// Standard deviation that all groups share, and that alike groups share, as natural logarithms. Chosen, as the lengths
+/// below, with the regrets of the six hosts of the training in sight (`docs/limitations.md`).
 const SHARED_LN: f64 = 0.2;
 const ALIKE_LN: f64 = 0.15;
 /// Lengths over which groups are alike, in natural logarithms: of SIMD lanes or threads, and of a cold fork and join.
