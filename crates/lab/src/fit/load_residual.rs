@@ -253,6 +253,44 @@ mod tests {
     }
 
     #[test]
+    fn a_new_machine_gets_what_machines_of_its_kind_share() {
+        let all = profiles();
+        let found = places(all.iter(), None);
+        // The mean over all loads at a position, of machines with these remainders and positions.
+        let at = |machines: &[(f64, f64)], position: f64| {
+            let of = |(machine, &(ln, at)): (usize, &(f64, f64))| {
+                let remainder = move |s: &Spot| Remainder { load: s.load, ln, behind: 1.0, machine, at: vec![at] };
+                all[0].points.iter().map(remainder).collect::<Vec<_>>()
+            };
+            let groups =
+                residual(&found, &machines.iter().enumerate().flat_map(of).collect::<Vec<_>>(), false).unwrap();
+            let weights = GroupResidual::weights_at(&groups, &[position]);
+            let residual = Residual::new(Arc::clone(&found), weights, false);
+            all[0].points.iter().map(|s| residual.ln(&s.load)).sum::<f64>() / all[0].points.len() as f64
+        };
+        let opposed = at(&[(0.2, 2.0), (-0.2, 2.0)], 2.0);
+        assert!(opposed.abs() < 0.01, "{opposed}");
+        let agreed = at(&[(0.2, 2.0), (0.2, 2.0)], 2.0);
+        assert!((0.16..0.2).contains(&agreed), "{agreed}");
+        // One machine shows less than two, and another kind of machine gets less.
+        let [own, other] = [2.0, 9.0].map(|position| at(&[(0.2, 2.0), (0.0, 9.0)], position));
+        assert!(own < agreed && other < 0.5 * own, "{own} {other}");
+    }
+
+    #[test]
+    fn the_solver_fulfils_its_equation() {
+        let block =
+            |k: f64| Array2::from_shape_fn((3, 3), |(a, b)| if a == b { 5.0 + k } else { k / (1 + a + b) as f64 });
+        let blocks = [block(0.5), block(2.0)];
+        let inverse = ndarray::array![[2.0, -0.5], [-0.5, 1.0]];
+        let right = ndarray::array![[1.0, -2.0, 3.0], [0.5, 4.0, -1.0]];
+        let x = solved(&inverse, &blocks, &right).unwrap();
+        let mut image = inverse.dot(&x);
+        image.rows_mut().into_iter().zip(&blocks).zip(x.rows()).for_each(|((mut to, m), x)| to += &m.dot(&x));
+        assert!((image - right).iter().all(|off| off.abs() < 1e-3));
+    }
+
+    #[test]
     fn without_rows_nothing_is_corrected() {
         let found = places(profiles().iter(), None);
         assert_eq!(residual(&found, &[], true).unwrap(), []);
