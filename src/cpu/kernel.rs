@@ -3,6 +3,7 @@
 //! Each loop is written once over [`Lanes`], and compiled for each level inside a function that enables its
 //! instructions.
 
+pub(crate) mod bounds;
 pub(crate) mod contain;
 pub(crate) mod node;
 #[cfg(any(test, not(target_arch = "x86_64")))]

@@ -10,15 +10,17 @@
 
 mod grown;
 mod motion;
+mod prices;
 mod tree;
 
 use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, FrameKind, FrameWork, check_count};
+use crate::clock::{Instant, TICKS};
 use crate::cpu::Threads;
 use crate::cpu::columns::part;
 use crate::cpu::kernel::{overlap, prefetch};
 use crate::cpu::level::Simd;
-use crate::cpu::tree::FAR;
+use crate::cpu::tree::{FAR, Upkeep};
 use crate::cpu::workers::{Outputs, Workers};
 use crate::error::Error;
 use crate::load::{FramePlan, SceneStats};
@@ -41,7 +43,10 @@ struct PairCache {
     outputs: Outputs,
     motion: Motion,
     grown: Grown,
+    /// Of the grown boxes while pairs are kept, of the boxes themselves otherwise.
     tree: GrownTree,
+    /// Of the tree while pairs are not kept.
+    upkeep: Upkeep,
     /// The share of the boxes of each task.
     shares: Vec<Share>,
     /// The share of the kept pairs of each task. Tasks beyond those of this frame have none.
@@ -64,19 +69,21 @@ enum Kept {
 
 /// Makes an instance for any of these numbers of threads, ascending. It begins with the least.
 pub(super) fn create(threads: &[u32], pools: &Threads, simd: Simd) -> Result<Box<dyn BroadPhase>, Error> {
-    Ok(Box::new(pair_cache(threads, pools, simd)?))
+    Ok(Box::new(pair_cache(threads, pools, simd, TICKS)?))
 }
 
-fn pair_cache(threads: &[u32], pools: &Threads, simd: Simd) -> Result<PairCache, Error> {
+/// `timed`: it decides by the clock.
+fn pair_cache(threads: &[u32], pools: &Threads, simd: Simd, timed: bool) -> Result<PairCache, Error> {
     let widths: Vec<Workers> =
         threads.iter().map(|&k| Workers::new("pair-cache", k, pools)).collect::<Result<_, _>>()?;
     let widest = &widths[widths.len() - 1];
     let tasks = widest.tasks();
     Ok(PairCache {
         outputs: Outputs::default(),
-        motion: Motion::default(),
+        motion: Motion::new(timed),
         grown: Grown::new(simd),
         tree: GrownTree::new(simd),
+        upkeep: Upkeep::new(timed),
         shares: (0..tasks).map(|_| Share::default()).collect(),
         kept: (0..tasks).map(|_| Pairs::new()).collect(),
         dealt: Pairs::new(),
@@ -97,10 +104,13 @@ impl BroadPhase for PairCache {
         pairs.clear();
         check_count(boxes.len())?;
         self.fit(boxes.len());
+        let started = Instant::now();
+        let each = |since: Instant| since.elapsed().as_nanos() as f32 / boxes.len().max(1) as f32;
         let kept = match self.motion.advise(plan, boxes) {
             Advice::Scratch => Kept::Incomplete,
             Advice::Keep(margin) => {
-                let kept = self.keep(plan, boxes, margin, pairs);
+                self.upkeep.forget();
+                let kept = self.keep(plan, boxes, margin, pairs, || each(started));
                 if kept != Ok(Kept::Pays) {
                     // The grown boxes may be half of this frame and half of the previous one.
                     self.grown.forget();
@@ -115,9 +125,14 @@ impl BroadPhase for PairCache {
         };
         if kept == Kept::Incomplete {
             pairs.clear();
-            let Self { workers, tree, outputs, .. } = self;
-            tree.build(workers, boxes, &plan.stats(boxes), pairs.filter())?;
+            let Self { workers, tree, upkeep, outputs, .. } = self;
+            // Without the time that keeping took in vain.
+            let started = Instant::now();
+            upkeep.update(tree.of_boxes(), workers, boxes, || plan.stats(boxes), pairs.filter())?;
+            let searching = Instant::now();
             outputs.find(workers, pairs, |k, parts, list| tree.self_pairs(k, parts, list));
+            upkeep.searched(searching, boxes.len());
+            self.motion.found_from_scratch(boxes.len(), pairs.overlapping(), each(started), upkeep.built_ns());
             self.last_frame = FrameKind::FromScratch;
         }
         self.motion.found(boxes.len(), pairs.overlapping());
@@ -197,8 +212,15 @@ impl PairCache {
         }
     }
 
-    /// Finds the pairs among the kept ones.
-    fn keep(&mut self, plan: &FramePlan, boxes: &[Aabb], margin: Margin, pairs: &mut Pairs) -> Result<Kept, Error> {
+    /// Finds the pairs among the kept ones. `took` returns the nanoseconds of the frame so far, for each box.
+    fn keep(
+        &mut self,
+        plan: &FramePlan,
+        boxes: &[Aabb],
+        margin: Margin,
+        pairs: &mut Pairs,
+        took: impl Fn() -> f32,
+    ) -> Result<Kept, Error> {
         let Self { workers, outputs, motion, grown, tree, shares, kept, last_frame, .. } = self;
         let workers = &*workers;
         let (shares, kept) = (&mut shares[..workers.tasks()], &mut kept[..workers.tasks()]);
@@ -255,7 +277,8 @@ impl PairCache {
             Ok(())
         })?;
         let kept_pairs = kept.iter().map(Pairs::len).sum();
-        let pays = motion.learn(boxes.len(), &changes, &Work { kept_pairs, nodes: looked.into_inner(), rebuilt });
+        let did = Work { kept_pairs, nodes: looked.into_inner(), rebuilt };
+        let pays = motion.learn(boxes.len(), &changes, &did, took());
         Ok(match (kept.iter().all(Pairs::is_complete), pays) {
             (false, _) => Kept::Incomplete,
             (true, false) => Kept::CostsMore,
@@ -271,7 +294,7 @@ mod tests {
     use FrameKind::{FromScratch, Rebuilt, Updated};
 
     fn frames(scenario: Scenario, count: usize, plan: &FramePlan) -> Vec<FrameWork> {
-        let mut method = create(&[1], &Threads::default(), Simd::Portable).unwrap();
+        let mut method = pair_cache(&[1], &Threads::default(), Simd::Portable, false).unwrap();
         let mut scene = Scene::start(scenario, 1000, 1);
         let mut pairs = Pairs::new();
         let frame = |_| {
@@ -316,7 +339,7 @@ mod tests {
 
     #[test]
     fn boxes_that_come_to_rest_keep_few_pairs() {
-        let method = || pair_cache(&[1], &Threads::default(), Simd::Portable).unwrap();
+        let method = || pair_cache(&[1], &Threads::default(), Simd::Portable, false).unwrap();
         let rested = *kept(&mut method(), (0..100).map(|_| 0.0), false).last().unwrap();
         let kept = kept(&mut method(), (0..160).map(to_and_fro).chain((0..200).map(|_| 0.0)), false);
         let (moved, late) = (kept[150], kept[359]);
@@ -326,7 +349,7 @@ mod tests {
 
     #[test]
     fn margin_after_a_pause_follows_the_new_motion() {
-        let mut method = pair_cache(&[1], &Threads::default(), Simd::Portable).unwrap();
+        let mut method = pair_cache(&[1], &Threads::default(), Simd::Portable, false).unwrap();
         let moving = *kept(&mut method, (0..160).map(to_and_fro), true).last().unwrap();
         // As after a hundred frames of another method, in which all boxes went elsewhere.
         let mut pairs = Pairs::new();

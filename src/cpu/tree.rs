@@ -5,9 +5,11 @@
 //! them.
 
 mod curve;
+mod upkeep;
 
 use crate::aabb::Aabb;
 use crate::cpu::columns::part;
+use crate::cpu::kernel::bounds::Bounds;
 use crate::cpu::kernel::node::{Group, LANES, Node};
 use crate::cpu::kernel::prefetch;
 use crate::cpu::kernel::walk::Walk;
@@ -19,6 +21,9 @@ use crate::load::SceneStats;
 use crate::pairs::Pairs;
 use curve::{Curve, Order};
 use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+pub(crate) use upkeep::Upkeep;
 
 /// The id of an empty lane. No box has it: there are at most this many boxes.
 pub(crate) const NOBODY: u32 = u32::MAX;
@@ -52,10 +57,19 @@ pub(crate) struct Tree {
 /// The boxes of a frame that are in a tree.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Members<'a> {
-    /// Every box.
-    All,
+    /// The boxes from this position on.
+    From(usize),
     /// The boxes at these positions, which ascend.
     Of(&'a [u32]),
+}
+
+impl Members<'_> {
+    fn len(&self, boxes: &[Aabb]) -> usize {
+        match self {
+            Self::From(first) => boxes.len() - first,
+            Self::Of(ids) => ids.len(),
+        }
+    }
 }
 
 impl Tree {
@@ -82,49 +96,102 @@ impl Tree {
         filter: Option<&Filter>,
     ) -> Result<(), Error> {
         let Self { ids, places: in_use, levels, moving, order, .. } = self;
-        let split = order.sort(workers, boxes, members, &Curve::over(stats), filter)?;
+        let curve = Curve::over(stats, members.len(boxes));
+        let split = order.sort(workers, boxes, members, &curve, filter)?;
         let sorted = order.ids();
         // The fixed boxes begin a new leaf.
         *moving = split.div_ceil(LANES);
         let fixed_from = if split == sorted.len() { split } else { *moving * LANES };
-        let places = fixed_from + sorted.len() - split;
-        *in_use = places;
-        let used = lay_out(levels, ids, places)?;
+        *in_use = fixed_from + sorted.len() - split;
+        lay_out(levels, ids, *in_use)?;
+        let places = &mut ids[..*in_use];
+        places[split..fixed_from].fill(NOBODY);
+        let fixed = places.len().min(fixed_from);
+        let (before, behind) = places.split_at_mut(fixed);
+        workers.map(&sorted[..split], &mut before[..split], |_, &key| key as u32);
+        workers.map(&sorted[split..], behind, |_, &key| key as u32);
+        ids[*in_use..].fill(NOBODY);
+        self.fill(workers, boxes);
+        Ok(())
+    }
+
+    /// Makes room for the boxes from position `before` on, which are new, in leaves behind all others. Boxes beyond the
+    /// last one are taken out by [`refit`](Self::refit). Returns `false` if the tree has to be built instead.
+    fn resize(&mut self, workers: &Workers, boxes: &[Aabb], before: usize, stats: impl FnOnce() -> SceneStats) -> bool {
+        let Self { ids, places, levels, moving, order, .. } = self;
+        if boxes.len() <= before {
+            return true;
+        }
+        // Behind fixed boxes stand no others, because pairs are only looked for from the leaves before them.
+        let all_move = places.div_ceil(LANES) <= *moving;
+        let few = boxes.len() - before <= before / 4;
+        let curve = Curve::over(&stats(), boxes.len() - before);
+        let members = Members::From(before);
+        // A build reports the error.
+        if !all_move || !few || order.sort(workers, boxes, members, &curve, None).is_err() {
+            return false;
+        }
+        let first = ids.len();
+        *places = first + boxes.len() - before;
+        *moving = places.div_ceil(LANES);
+        if lay_out(levels, ids, *places).is_err() {
+            return false;
+        }
+        ids[first..].fill(NOBODY);
+        ids[first..].iter_mut().zip(order.ids()).for_each(|(id, &key)| *id = key as u32);
+        true
+    }
+
+    /// Gives each box of the tree its present bounds, and takes out those beyond the last one. Returns `false` if a box
+    /// is invalid, or has become fixed or ceased to be; then the tree is of no use.
+    fn refit(&mut self, workers: &Workers, boxes: &[Aabb], filter: Option<&Filter>) -> bool {
+        let same = |(place, &id): (usize, &u32)| {
+            id as usize >= boxes.len()
+                || filter.is_some_and(|f| f.is_fixed(id as usize)) == (place >= self.moving * LANES)
+        };
+        let known = filter.is_none() && self.places <= self.moving * LANES || self.ids.iter().enumerate().all(same);
+        known && self.fill(workers, boxes)
+    }
+
+    /// Writes the bounds of all boxes to the leaves, and those of the leaves to the nodes above. Returns whether every
+    /// box is valid.
+    fn fill(&mut self, workers: &Workers, boxes: &[Aabb]) -> bool {
+        let Self { ids, levels, .. } = self;
+        let used = levels.iter().rposition(|level| !level.is_empty()).map_or(0, |top| top + 1);
         let (leaves, above) = levels.split_at_mut(1);
         let parents = &mut above[0];
         let size = parents.len().div_ceil(workers.tasks()).max(SMALLEST_FILL);
         let parts =
             parents.chunks_mut(size).zip(leaves[0].chunks_mut(size * LANES)).zip(ids.chunks_mut(size * LANES * LANES));
-        workers.each_of(parts.zip((0..).step_by(size * LANES * LANES)), |(((parents, leaves), ids), first)| {
+        let valid = AtomicBool::new(true);
+        workers.each_of(parts, |((parents, leaves), ids)| {
+            let mut all_valid = true;
             for (at, leaf) in leaves.iter_mut().enumerate() {
                 *leaf = Node::EMPTY;
-                let mut bounds: Option<Aabb> = None;
+                let first = at * LANES;
+                let mut bounds = Bounds::none();
                 for lane in 0..LANES {
-                    let place = first + at * LANES + lane;
-                    let from = if place < split {
-                        place
-                    } else if (fixed_from..places).contains(&place) {
-                        place - fixed_from + split
-                    } else {
-                        ids[at * LANES + lane] = NOBODY;
+                    // Neighbours on the curve lie anywhere in memory.
+                    if let Some(next) = ids.get(first + lane + AHEAD).and_then(|&id| boxes.get(id as usize)) {
+                        prefetch(next);
+                    }
+                    let Some(b) = boxes.get(ids[first + lane] as usize) else {
+                        ids[first + lane] = NOBODY;
                         continue;
                     };
-                    // Neighbours on the curve lie anywhere in memory.
-                    if let Some(&next) = sorted.get(from + AHEAD) {
-                        prefetch(&boxes[next as u32 as usize]);
-                    }
-                    let id = sorted[from] as u32;
-                    let b = &boxes[id as usize];
-                    ids[at * LANES + lane] = id;
                     leaf.set(lane, b);
-                    bounds = Some(bounds.map_or(*b, |all| all.union(b)));
+                    bounds.add(b);
                 }
                 if at % LANES == 0 {
                     parents[at / LANES] = Node::EMPTY;
                 }
-                if let Some(bounds) = bounds {
+                all_valid &= bounds.is_valid();
+                if let Some(bounds) = bounds.get() {
                     parents[at / LANES].set(at % LANES, &bounds);
                 }
+            }
+            if !all_valid {
+                valid.store(false, Relaxed);
             }
         });
         for level in 1..used - 1 {
@@ -134,7 +201,17 @@ impl Tree {
                 here[0][at / LANES].set(at % LANES, &node.bounds());
             }
         }
-        Ok(())
+        valid.into_inner()
+    }
+
+    /// Returns half the surface area of all leaves, whose edges count as at most `longest`.
+    fn half_area(&self, longest: f32) -> f64 {
+        self.levels.get(1).map_or(0.0, |level| level.iter().map(|node| f64::from(node.half_area(longest))).sum())
+    }
+
+    /// Returns the number of places in use, those of removed boxes included.
+    fn places(&self) -> usize {
+        self.places
     }
 
     /// Returns part `k` of `parts` of the leaves with boxes that may move. All pairs are found from these leaves.

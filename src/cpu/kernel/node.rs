@@ -69,6 +69,21 @@ impl Node {
         }
     }
 
+    /// Returns half the surface area of the bounds in all lanes, whose edges count as at most `longest`.
+    pub(crate) fn half_area(&self, longest: f32) -> f32 {
+        let area = |lane: usize| {
+            // NaN in an empty lane compares false.
+            let edge = |a: usize| {
+                let edge = self.high[a][lane] - self.low[a][lane];
+                if edge > longest { longest } else { edge }
+            };
+            let [x, y, z] = [edge(0), edge(1), edge(2)];
+            let area = x * y + y * z + z * x;
+            if area >= 0.0 { area } else { 0.0 }
+        };
+        (0..LANES).map(area).sum()
+    }
+
     /// Returns a mask: bit k is set if lane k overlaps a box.
     #[inline(always)]
     pub(super) fn overlapping(&self, b: &Aabb) -> u32 {

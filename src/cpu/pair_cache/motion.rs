@@ -6,6 +6,7 @@ mod mean_work;
 mod tests;
 
 use super::grown::{Changes, Margin};
+use super::prices::Prices;
 use crate::aabb::Aabb;
 use crate::load::{Displacement, FramePlan, is_same_pace};
 use mean_work::MeanWork;
@@ -90,6 +91,7 @@ pub(super) struct Motion {
     told: Option<f32>,
     /// No larger margin is begun with: that one kept too many pairs, of boxes near one another that do not overlap yet.
     most_margin: f32,
+    prices: Prices,
 }
 
 /// What is known while pairs are kept.
@@ -146,8 +148,9 @@ impl Keeping {
     }
 }
 
-impl Default for Motion {
-    fn default() -> Self {
+impl Motion {
+    /// `timed`: measured times decide, and not the cost model alone.
+    pub(super) fn new(timed: bool) -> Self {
         Self {
             displacement: Displacement::default(),
             density: None,
@@ -159,11 +162,10 @@ impl Default for Motion {
             crowded: false,
             told: None,
             most_margin: MARGINS[MARGINS.len() - 1],
+            prices: Prices::new(timed),
         }
     }
-}
 
-impl Motion {
     /// What to do about this frame.
     pub(super) fn advise(&mut self, plan: &FramePlan, boxes: &[Aabb]) -> Advice {
         self.told = plan.moved().map(|moved| moved as f32);
@@ -177,6 +179,13 @@ impl Motion {
     /// Takes note of the pairs of a frame.
     pub(super) fn found(&mut self, objects: usize, pairs: u64) {
         self.density = Some(pairs as f32 / objects.max(1) as f32);
+    }
+
+    /// Learns from a frame from scratch with this many pairs, which took `took` nanoseconds for each box. One that
+    /// builds its tree takes `built`.
+    pub(super) fn found_from_scratch(&mut self, objects: usize, pairs: u64, took: f32, built: Option<f32>) {
+        self.found(objects, pairs);
+        self.prices.add_scratch(took, built, cost::scratch(cost::far(objects), self.density.unwrap_or_default()));
     }
 
     /// Keeping failed, because there were too many pairs to keep or because it did not pay; it will not be tried for
@@ -251,8 +260,9 @@ impl Motion {
         })
     }
 
-    /// Learns from a frame in which boxes left as `changes` says. `false` when keeping does not pay any more.
-    pub(super) fn learn(&mut self, objects: usize, changes: &Changes, did: &Work) -> bool {
+    /// Learns from a frame in which boxes left as `changes` says and which took `took` nanoseconds for each box.
+    /// `false` when keeping does not pay any more.
+    pub(super) fn learn(&mut self, objects: usize, changes: &Changes, did: &Work, took: f32) -> bool {
         let far = cost::far(objects);
         let scratch = cost::scratch(far, self.density.unwrap_or_default());
         let Some(k) = &mut self.keeping else { return false };
@@ -293,7 +303,7 @@ impl Motion {
         if k.frames == PROVEN {
             (self.next_pause, self.most_margin) = (PAUSE[0], MARGINS[MARGINS.len() - 1]);
         }
-        k.cost < scratch
+        self.prices.pays(took, k.cost, scratch)
     }
 
     /// How far the boxes moved since the frame before, and how many pairs for each there are; `None` where nobody
@@ -334,7 +344,11 @@ impl Motion {
         let margins = MARGINS.into_iter().filter(|&m| m <= self.most_margin);
         let best = margins.min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(MARGINS[0]);
         let kept = kept(best);
-        (cost(best) < scratch && kept < MOST_KEPT).then(|| Keeping {
+        if !self.prices.promises(cost(best), scratch) || kept >= MOST_KEPT {
+            return None;
+        }
+        self.prices.begin();
+        Some(Keeping {
             margin: Margin { share: best, longest_edge: longest_edge(plan, boxes) },
             pace: motion,
             cost: cost(best),

@@ -48,12 +48,17 @@ impl GrownTree {
         stats: &SceneStats,
         filter: Option<&Filter>,
     ) -> Result<(), Error> {
-        self.tree.build(workers, boxes, Members::All, stats, filter)?;
+        self.tree.build(workers, boxes, Members::From(0), stats, filter)?;
         ensure(&mut self.place_of, boxes.len(), "boxes in a tree")?;
         for (place, &id) in self.tree.ids().iter().enumerate().filter(|&(_, &id)| id != NOBODY) {
             self.place_of[id as usize] = place as u32;
         }
         Ok(())
+    }
+
+    /// Returns the tree for the boxes themselves, whose places are not known then.
+    pub(super) fn of_boxes(&mut self) -> &mut Tree {
+        &mut self.tree
     }
 
     /// Adds part `k` of `parts` of the pairs of all boxes that were in the tree when it was built.

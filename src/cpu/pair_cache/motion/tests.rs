@@ -3,7 +3,7 @@ use crate::scene::{Scenario, Scene};
 
 fn keeps(scenario: Scenario) -> bool {
     let mut scene = Scene::start(scenario, 2000, 1);
-    let mut motion = Motion::default();
+    let mut motion = Motion::new(false);
     motion.advise(&FramePlan::default(), scene.boxes());
     motion.found(2000, 1000);
     scene.advance();
@@ -19,7 +19,7 @@ fn pairs_are_kept_where_boxes_move_little_and_not_where_they_move_far() {
 #[test]
 fn too_many_pairs_are_not_kept_and_a_failure_is_not_tried_again_at_once() {
     let boxes = vec![Aabb::cube([0.0; 3], 1.0); 500];
-    let mut motion = Motion::default();
+    let mut motion = Motion::new(false);
     for pairs in [500 * 499 / 2, 1000] {
         motion.found(500, pairs);
         motion.advise(&FramePlan::default(), &boxes);
@@ -42,11 +42,11 @@ fn a_pause_ends_when_boxes_that_moved_too_far_come_to_rest() {
     let paused = |kept: u32, too_many: bool, moves: [f64; 2]| {
         let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
         let plan = |moved| FramePlan::default().with_moved(Some(moved)).with_pairs(Some(500.0));
-        let mut motion = Motion::default();
+        let mut motion = Motion::new(false);
         motion.advise(&plan(0.001), &boxes);
         let changes = Changes { left: 0, far_away: 0, new: 0..0, gone: 0..0 };
         let did = Work { kept_pairs: 500, nodes: 0, rebuilt: false };
-        assert!((0..kept).all(|_| motion.learn(1000, &changes, &did)));
+        assert!((0..kept).all(|_| motion.learn(1000, &changes, &did, 0.0)));
         motion.keeping.as_mut().unwrap().tests = 0.0;
         motion.stop(too_many);
         let paused = |at: &u32| {
@@ -70,9 +70,9 @@ fn frames_that_others_ran_count_for_a_pause_and_end_it_where_boxes_have_come_to_
     let did = Work { kept_pairs: 500, nodes: 0, rebuilt: false };
     // Frames from scratch after so many of others, where boxes moved so far before and move so far now.
     let paused = |too_many: bool, missed: u64, moves: [f64; 2]| {
-        let mut motion = Motion::default();
+        let mut motion = Motion::new(false);
         motion.advise(&plan(moves[0]), &boxes);
-        motion.learn(1000, &changes, &did);
+        motion.learn(1000, &changes, &did, 0.0);
         motion.keeping.as_mut().unwrap().tests = 0.0;
         motion.stop(too_many);
         motion.missed(missed);
@@ -93,7 +93,7 @@ fn where_half_of_the_boxes_leave_at_once_the_margin_stays_unless_they_move_at_an
     let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
     let plan = |moved| FramePlan::default().with_moved(Some(moved)).with_pairs(Some(500.0));
     let share_after = |moved: f64| {
-        let mut motion = Motion::default();
+        let mut motion = Motion::new(false);
         motion.advise(&plan(0.02), &boxes);
         // As found in many frames.
         motion.keeping.as_mut().unwrap().margin.share = 0.123;
@@ -107,17 +107,17 @@ fn where_half_of_the_boxes_leave_at_once_the_margin_stays_unless_they_move_at_an
 
 #[test]
 fn boxes_that_go_far_wear_the_order_sooner_than_those_that_wander() {
-    let mut motion = Motion::default();
+    let mut motion = Motion::new(false);
     let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
     motion.found(1000, 0);
     (0..2).for_each(|_| _ = motion.advise(&FramePlan::default(), &boxes));
     let frames = |far_away: usize, motion: &mut Motion| {
         let changes = Changes { left: 10, far_away, new: 0..0, gone: 0..0 };
         let did = |rebuilt| Work { kept_pairs: 1000, nodes: 120, rebuilt };
-        motion.learn(1000, &changes, &did(true));
+        motion.learn(1000, &changes, &did(true), 0.0);
         (0..1000)
             .take_while(|_| {
-                motion.learn(1000, &changes, &did(false));
+                motion.learn(1000, &changes, &did(false), 0.0);
                 !motion.wants_rebuild(1000, &changes)
             })
             .count()
@@ -129,7 +129,7 @@ fn boxes_that_go_far_wear_the_order_sooner_than_those_that_wander() {
 #[test]
 fn where_no_boxes_overlap_the_margin_is_no_larger_than_slow_boxes_need_and_few_pairs_may_be_kept() {
     let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
-    let mut motion = Motion::default();
+    let mut motion = Motion::new(false);
     motion.found(1000, 0);
     let plan = FramePlan::default().with_moved(Some(0.005));
     motion.advise(&plan, &boxes);
@@ -142,7 +142,7 @@ fn where_no_boxes_overlap_the_margin_is_no_larger_than_slow_boxes_need_and_few_p
 fn a_margin_that_keeps_too_many_pairs_is_halved_and_one_that_too_many_leave_is_not() {
     let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
     let margin_after = |kept_pairs: usize, left: usize| {
-        let mut motion = Motion::default();
+        let mut motion = Motion::new(false);
         motion.found(1000, 0);
         let plan = FramePlan::default().with_moved(Some(0.05));
         let keep = |motion: &mut Motion| loop {
@@ -153,7 +153,7 @@ fn a_margin_that_keeps_too_many_pairs_is_halved_and_one_that_too_many_leave_is_n
         let first = keep(&mut motion);
         let changes = Changes { left, far_away: 0, new: 0..0, gone: 0..0 };
         let did = Work { kept_pairs, nodes: 12 * left as u64, rebuilt: false };
-        assert!((0..100).any(|_| !motion.learn(1000, &changes, &did)), "it never ceases to pay");
+        assert!((0..100).any(|_| !motion.learn(1000, &changes, &did, 0.0)), "it never ceases to pay");
         motion.stop(false);
         keep(&mut motion) / first
     };

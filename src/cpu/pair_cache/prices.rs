@@ -1,0 +1,106 @@
+//! What frames cost by the clock: with kept pairs, and from scratch.
+
+/// Frames from scratch before pairs are kept: one that builds the tree, and two that may refit it.
+const FEWEST_FRAMES: u32 = 3;
+
+/// Frames over which a cost is averaged.
+const LEARNING: f32 = 8.0;
+
+/// Keeping is tried if it promises to cost at most this many times a frame from scratch: the promise is rough.
+const HOPE: f32 = 1.3;
+
+/// Keeping stops when it has cost this many frames from scratch more than finding as many from scratch. To begin costs
+/// one or two.
+const MOST_LOST: f32 = 6.0;
+
+/// One frame counts as at most this many from scratch: an interruption by the system says nothing.
+const MOST_OF_FRAME: f32 = 4.0;
+
+/// Measured costs of a box in nanoseconds, over what the cost model says of the frame. The model's constants are those
+/// of another machine, but it knows how costs change with the scene.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Prices {
+    /// Without a clock, the model alone decides.
+    timed: bool,
+    /// Frames from scratch so far.
+    frames: u32,
+    /// Of a frame from scratch as it was in the mean, and of one that builds its tree.
+    scratch: f32,
+    built: f32,
+    /// Cost of keeping beyond that of frames from scratch, in such frames, since it was last below.
+    lost: f32,
+}
+
+impl Prices {
+    pub(super) fn new(timed: bool) -> Self {
+        Self { timed, frames: 0, scratch: 1.0, built: 1.0, lost: 0.0 }
+    }
+
+    /// Learns from a frame from scratch, of which the model says `model`. `built`: the time of one that builds.
+    pub(super) fn add_scratch(&mut self, took: f32, built: Option<f32>, model: f32) {
+        self.frames = self.frames.saturating_add(1);
+        let mean = |mean: f32, now: f32| mean + (now.min(2.0 * mean) - mean) / LEARNING;
+        let now = took / model;
+        self.scratch = if self.frames < FEWEST_FRAMES { now } else { mean(self.scratch, now) };
+        self.built = built.map_or(now, |built| built / model);
+    }
+
+    /// Returns whether keeping is worth a try.
+    pub(super) fn promises(&self, keeping: f32, scratch: f32) -> bool {
+        if !self.timed {
+            return keeping < scratch;
+        }
+        self.frames >= FEWEST_FRAMES && keeping * self.built < HOPE * scratch * self.scratch
+    }
+
+    /// Keeping begins.
+    pub(super) fn begin(&mut self) {
+        self.lost = 0.0;
+    }
+
+    /// Learns from a frame with kept pairs. `keeping` and `scratch`: what the model says. Returns whether to go on.
+    pub(super) fn pays(&mut self, took: f32, keeping: f32, scratch: f32) -> bool {
+        if !self.timed {
+            return keeping < scratch;
+        }
+        let over = (took / (scratch * self.scratch)).min(MOST_OF_FRAME) - 1.0;
+        // NaN, of 0 over 0, counts as 0.
+        self.lost = (self.lost + over).max(0.0);
+        self.lost <= MOST_LOST
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keeping_is_tried_after_three_frames_and_stops_when_it_has_lost_six() {
+        let mut prices = Prices::new(true);
+        for _ in 0..3 {
+            assert!(!prices.promises(10.0, 40.0));
+            prices.add_scratch(50.0, Some(100.0), 40.0);
+        }
+        // A unit of the model is 2.5 ns for a build, so keeping promises 25 ns; then 75 ns.
+        assert!(prices.promises(10.0, 40.0) && !prices.promises(30.0, 40.0));
+        prices.begin();
+        // The first frame builds. Then half a frame is saved in each.
+        assert!(prices.pays(150.0, 10.0, 40.0));
+        assert!((0..1000).all(|k| prices.pays(if k % 50 == 0 { 150.0 } else { 25.0 }, 10.0, 40.0)));
+        // An interruption is no reason to stop, a tenth more in each frame is.
+        assert!(prices.pays(5000.0, 10.0, 40.0));
+        assert!((0..10).all(|_| prices.pays(25.0, 10.0, 40.0)));
+        let frames = (0..1000).take_while(|_| prices.pays(55.0, 10.0, 40.0)).count();
+        assert!((50..70).contains(&frames), "{frames}");
+        // In a denser scene both cost more.
+        prices.begin();
+        assert!((0..1000).all(|_| prices.pays(90.0, 60.0, 80.0)));
+    }
+
+    #[test]
+    fn without_a_clock_the_model_decides() {
+        let mut prices = Prices::new(false);
+        assert!(prices.promises(39.0, 40.0) && !prices.promises(41.0, 40.0));
+        assert!(prices.pays(1.0e9, 39.0, 40.0) && !prices.pays(0.0, 41.0, 40.0));
+    }
+}

@@ -1,0 +1,186 @@
+//! Decides in each frame whether a tree is refitted or rebuilt.
+//!
+//! Refitting is cheaper than rebuilding, but the nodes of a refitted tree widen as boxes move, and searching it gets
+//! more expensive. The excess of each search is taken to be that of the area of the leaves. The tree is rebuilt when
+//! the sum of the excesses since the last build reaches the difference between a build and a refit. If the excess grows
+//! at a constant rate, no other number of frames between two builds is cheaper; and however it grows, the cost is at
+//! most twice that of the best decisions in hindsight (the ski-rental bound).
+
+use super::{Members, Tree};
+use crate::aabb::Aabb;
+use crate::clock::Instant;
+use crate::cpu::workers::Workers;
+use crate::error::Error;
+use crate::filter::Filter;
+use crate::load::SceneStats;
+
+/// Frames in which no refit is tried after one that was in vain, at most.
+const MOST_PAUSE: u32 = 64;
+
+/// Frames over which a time is averaged, and the most by which one frame may exceed the average: an interruption by the
+/// system says nothing.
+const LEARNING: f64 = 8.0;
+const MOST_RISE: f64 = 2.0;
+
+/// Places over boxes beyond which a tree has too many empty lanes.
+const MOST_PLACES: f64 = 4.0 / 3.0;
+
+/// A build over a refit, in searches, without a clock. In `uniform` with 1000 to 100 000 boxes on the Zen 3 host of
+/// `datasets/` it was NOCLOCK.
+const NO_CLOCK: f64 = 0.5;
+
+/// See the module.
+#[derive(Debug)]
+pub(crate) struct Upkeep {
+    /// About the tree that the previous call left. `None`: it can't be refitted.
+    tree: Option<Known>,
+    /// Frames until a refit is tried again, and their number after the next refit in vain.
+    pause: u32,
+    next_pause: u32,
+    build: Mean,
+    refit: Mean,
+    search: Mean,
+    /// Whether measured times decide.
+    timed: bool,
+    #[cfg(test)]
+    builds: u64,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Known {
+    boxes: usize,
+    /// Half area of the leaves for each box when the tree was built, with edges up to `longest`.
+    area: f64,
+    longest: f32,
+    /// Excess of the last search over the first one as a share of that, and the sum since the tree was built.
+    excess: f64,
+    sum: f64,
+}
+
+/// Mean nanoseconds for each box over the last frames.
+#[derive(Debug, Clone, Copy, Default)]
+struct Mean(Option<f64>);
+
+impl Mean {
+    fn add(&mut self, since: Instant, boxes: usize) {
+        let now = since.elapsed().as_nanos() as f64 / boxes.max(1) as f64;
+        self.0 = Some(self.0.map_or(now, |mean| mean + (now.min(MOST_RISE * mean) - mean) / LEARNING));
+    }
+}
+
+impl Upkeep {
+    /// `timed`: measured times decide, and not areas alone.
+    pub(crate) fn new(timed: bool) -> Self {
+        let [build, refit, search] = [Mean::default(); 3];
+        Self {
+            tree: None,
+            pause: 0,
+            next_pause: 0,
+            build,
+            refit,
+            search,
+            timed,
+            #[cfg(test)]
+            builds: 0,
+        }
+    }
+
+    /// Returns the nanoseconds for each box of a frame that builds its tree.
+    pub(crate) fn built_ns(&self) -> Option<f32> {
+        self.build.0.zip(self.search.0).map(|(build, search)| (build + search) as f32)
+    }
+
+    /// Returns the number of trees built so far.
+    #[cfg(test)]
+    pub(crate) fn builds(&self) -> u64 {
+        self.builds
+    }
+
+    /// Forgets the tree: the next frame builds it.
+    pub(crate) fn forget(&mut self) {
+        self.tree = None;
+    }
+
+    /// Refits or builds the tree of these boxes. `stats` returns their statistics.
+    ///
+    /// # Errors
+    /// [`Error::InvalidBox`] for the first invalid box, and [`Error::OutOfMemory`].
+    pub(crate) fn update(
+        &mut self,
+        tree: &mut Tree,
+        workers: &Workers,
+        boxes: &[Aabb],
+        stats: impl Fn() -> SceneStats,
+        filter: Option<&Filter>,
+    ) -> Result<(), Error> {
+        if self.refitted(tree, workers, boxes, &stats, filter) {
+            return Ok(());
+        }
+        self.tree = None;
+        let started = Instant::now();
+        let stats = stats();
+        tree.build(workers, boxes, Members::From(0), &stats, filter)?;
+        self.build.add(started, boxes.len());
+        #[cfg(test)]
+        (self.builds += 1);
+        let longest = (0..3).map(|a| stats.range(a).1).fold(0.0, f64::max) as f32;
+        let area = tree.half_area(longest) / boxes.len().max(1) as f64;
+        self.tree = Some(Known { boxes: boxes.len(), area, longest, excess: 0.0, sum: 0.0 });
+        Ok(())
+    }
+
+    /// Learns the time of a search.
+    pub(crate) fn searched(&mut self, since: Instant, boxes: usize) {
+        self.search.add(since, boxes);
+    }
+
+    /// Refits the tree if that pays. If not, the tree is of no use.
+    fn refitted(
+        &mut self,
+        tree: &mut Tree,
+        workers: &Workers,
+        boxes: &[Aabb],
+        stats: impl Fn() -> SceneStats,
+        filter: Option<&Filter>,
+    ) -> bool {
+        let Some(mut known) = self.tree else { return false };
+        let price = self.price();
+        if self.pause > 0 {
+            self.pause -= 1;
+            return false;
+        }
+        // The next excess is hardly less than the last one.
+        if known.sum + known.excess > price || boxes.is_empty() {
+            return false;
+        }
+        let started = Instant::now();
+        if !tree.resize(workers, boxes, known.boxes, stats) || !tree.refit(workers, boxes, filter) {
+            return false;
+        }
+        let area = tree.half_area(known.longest) / boxes.len() as f64;
+        // NaN, of 0 over 0, counts as 0.
+        known.excess = (area / known.area - 1.0).max(0.0);
+        let in_vain =
+            known.sum + known.excess > price || tree.places() as f64 > MOST_PLACES * boxes.len() as f64 + 64.0;
+        if in_vain {
+            self.pause = self.next_pause;
+            self.next_pause = (2 * self.next_pause + 1).min(MOST_PAUSE);
+            return false;
+        }
+        self.refit.add(started, boxes.len());
+        self.next_pause = 0;
+        (known.boxes, known.sum) = (boxes.len(), known.sum + known.excess);
+        self.tree = Some(known);
+        true
+    }
+
+    /// Returns what a build costs over a refit, in searches.
+    fn price(&self) -> f64 {
+        match (self.build.0, self.refit.0, self.search.0) {
+            (Some(build), refit, Some(search)) if self.timed && search > 0.0 => {
+                ((build - refit.unwrap_or(0.5 * build)) / search).clamp(0.05, 20.0)
+            }
+            _ => NO_CLOCK,
+        }
+    }
+}
