@@ -33,6 +33,11 @@
 //! | `tower` | everything on one line | 1 |
 //! | `aliased` | far objects wherever an evenly spaced sample looks | 0.06 to 0.13 |
 //! | `teleport` | every 30th frame everything jumps | 0.06 to 0.13 |
+//! | `churn` | `uniform`, one object in 100 replaced in each frame | 0.4 to 0.55 |
+//! | `sheets` | sheets as wide as the world | 0.07 to 0.14 |
+//! | `long-rods` | rods as long as the world along three axes | 0.65 to 0.85 |
+//! | `beams` | bounds of oblique beams of 1 to 100 edges among cubes | 0.1 to 0.4 |
+//! | `city` | fixed buildings and up to 2000 objects that move | 0.75 to 1.15, at most 0.08 of them moving |
 //!
 //! `fragmentation` follows Figure 1 of Avril, Gouranton and Arnaldi (ISVRI 2011); `brownian`, `free-fall` and
 //! `gravity` follow the scenes of those names in the benchmark Broadmark. [`Scenario`] describes each in full.

@@ -19,7 +19,7 @@ pub use scene::Scene;
 /// every frame with 1000, 2000 and 60 000 objects and several seeds.
 ///
 /// The scenes from [`Scenario::Parked`] on have few pairs and are hard all the same: each makes a common shortcut
-/// quadratic.
+/// quadratic. Those from [`Scenario::Churn`] on are for tests and benchmarks; the usual plan of a probe has none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Scenario {
@@ -98,11 +98,30 @@ pub enum Scenario {
     /// Unit cubes in a cube-shaped world of edge 2 (5 n)^(1/3), moving like [`Scenario::Uniform`]. In every 30th
     /// frame all jump to new random places. 0.06 to 0.13 pairs per object.
     Teleport,
+    /// [`Scenario::Uniform`], and in each frame one object in 100, at least one, leaves and another comes elsewhere.
+    /// The last object of the list takes the place of the one that leaves, and new ones are appended, as in the dense
+    /// array of an engine. 0.4 to 0.55 pairs per object.
+    Churn,
+    /// Sheets as wide as the world, a cube of edge 2 n^(1/3), at random heights. Every other one has no thickness, the
+    /// rest a fifth of the mean gap. Each moves along z by up to a quarter of the mean gap a frame. 0.07 to 0.14 pairs
+    /// per object.
+    Sheets,
+    /// Rods as long as the world, a cube of edge 2 n^(1/3), each along a random axis. They are 2.25 n^(-2/3) thick, so
+    /// that pairs per object do not grow with n, and move sideways by up to a quarter of their thickness per axis and
+    /// frame. 0.65 to 0.85 pairs per object.
+    LongRods,
+    /// Unit cubes and, one object in ten, the bounds of a beam in a random direction: lengths log-uniform from 1 to
+    /// 100, a fifth of an edge thick. All move like [`Scenario::Uniform`]. 0.1 to 0.4 pairs per object.
+    Beams,
+    /// A city of fixed buildings ([`Scene::is_fixed`]) on a lattice of pitch 2: 1.2 to 2.6 edges wide, 1 to 20 high.
+    /// Up to 2000 unit cubes, at most one object in 20, move like [`Scenario::Uniform`] between and in them. 0.75
+    /// to 1.15 pairs per object. At most 0.08 have a moving member, fewer above 40 000 objects.
+    City,
 }
 
 impl Scenario {
     /// Every scenario.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 25] = [
         Self::Uniform,
         Self::Fast,
         Self::Clustered,
@@ -123,9 +142,14 @@ impl Scenario {
         Self::Tower,
         Self::Aliased,
         Self::Teleport,
+        Self::Churn,
+        Self::Sheets,
+        Self::LongRods,
+        Self::Beams,
+        Self::City,
     ];
 
-    /// The hard scenarios: few pairs, and something that makes a common shortcut quadratic.
+    /// The hard scenarios of a probe: few pairs, and something that makes a common shortcut quadratic.
     pub const HARD: [Self; 10] = [
         Self::Parked,
         Self::Stations,
@@ -166,6 +190,11 @@ impl Scenario {
             Self::Tower => "tower",
             Self::Aliased => "aliased",
             Self::Teleport => "teleport",
+            Self::Churn => "churn",
+            Self::Sheets => "sheets",
+            Self::LongRods => "long-rods",
+            Self::Beams => "beams",
+            Self::City => "city",
         }
     }
 

@@ -64,6 +64,11 @@ fn every_platform_computes_the_same_bits() {
         (Scenario::Tower, [0xB97A_5BEB_2C67_8D0C, 0x2637_93C0_06AB_F807, 0x6119_7D45_8718_6E70]),
         (Scenario::Aliased, [0x564A_61C3_F825_BBD6, 0x8F2F_B0FD_B4B9_DD68, 0xADF8_5AD2_CF3A_11C7]),
         (Scenario::Teleport, [0xE118_4C2D_8112_8860, 0x0352_2EB2_6E5D_8E4B, 0xD5F6_3924_0118_C5CA]),
+        (Scenario::Churn, [0xC779_6697_5446_E185, 0x0A13_BCAF_475F_11A8, 0xD68F_871B_0861_7200]),
+        (Scenario::Sheets, [0x12EF_D63D_D71B_6ADF, 0x469F_8E45_FD2B_DE57, 0x0E31_75B9_6E01_065C]),
+        (Scenario::LongRods, [0xF17C_0DBE_2FE1_B1FD, 0xBE35_9EAA_DB83_5CFD, 0xB09F_54D3_7788_F990]),
+        (Scenario::Beams, [0xBF31_C9D8_BFFB_B522, 0x4C71_9DF2_6A18_21D3, 0x759B_C923_1154_4D77]),
+        (Scenario::City, [0x8B70_AA56_8547_7A68, 0x662C_3CC5_61E0_83D5, 0x60E8_8A35_E5F3_2F59]),
     ];
     let found = Scenario::ALL.map(|scenario| {
         let mut scene = scenario.start(1000, 1);
@@ -141,6 +146,10 @@ fn pairs_per_object_stay_in_the_documented_band() {
             Scenario::StaticWorld => (10.0, 11.0),
             Scenario::Tower => (0.999, 1.0),
             Scenario::Rods => (0.06, 0.12),
+            Scenario::Sheets => (0.07, 0.14),
+            Scenario::LongRods => (0.65, 0.85),
+            Scenario::Beams => (0.1, 0.4),
+            Scenario::City => (0.75, 1.15),
             Scenario::Parked | Scenario::Plates | Scenario::Asleep | Scenario::Aliased | Scenario::Teleport => {
                 (0.06, 0.13)
             }
@@ -211,6 +220,7 @@ fn those_that_never_move_are_named() {
             Scenario::Mixed => 4,
             Scenario::StaticWorld => 1900,
             Scenario::Parked | Scenario::Asleep => 40,
+            Scenario::City => 1900,
             _ => 0,
         };
         assert_eq!(still, expected, "{scenario}");
@@ -223,15 +233,61 @@ fn those_that_never_move_are_named() {
 }
 
 #[test]
-fn few_of_the_static_worlds_pairs_have_a_member_that_moves() {
-    let mut scene = Scenario::StaticWorld.start(2000, 2);
-    for _ in 0..20 {
-        let boxes = scene.boxes();
-        let moving = |(i, j): &(usize, usize)| !(scene.is_fixed(*i) && scene.is_fixed(*j));
-        let all = (0..2000).flat_map(|i| (i + 1..2000).map(move |j| (i, j)));
-        let wanted = all.filter(moving).filter(|&(i, j)| boxes[i].overlaps(&boxes[j])).count() as f64 / 2000.0;
-        assert!((0.01..0.12).contains(&wanted), "frame {}: {wanted}", scene.frame());
-        advance(&mut scene, 30);
+fn few_pairs_of_fixed_worlds_have_a_moving_member() {
+    for (scenario, band) in [(Scenario::StaticWorld, 0.01..0.12), (Scenario::City, 0.02..0.08)] {
+        let mut scene = scenario.start(2000, 2);
+        for _ in 0..20 {
+            let boxes = scene.boxes();
+            let moving = |(i, j): &(usize, usize)| !(scene.is_fixed(*i) && scene.is_fixed(*j));
+            let all = (0..2000).flat_map(|i| (i + 1..2000).map(move |j| (i, j)));
+            let wanted = all.filter(moving).filter(|&(i, j)| boxes[i].overlaps(&boxes[j])).count() as f64 / 2000.0;
+            assert!(band.contains(&wanted), "{scenario}, frame {}: {wanted}", scene.frame());
+            advance(&mut scene, 30);
+        }
+    }
+}
+
+#[test]
+fn cities_have_two_thousand_movers() {
+    for (objects, movers) in [(10, 0), (1000, 50), (40_000, 2000), (100_000, 2000)] {
+        let scene = Scenario::City.start(objects, 3);
+        assert_eq!((0..objects).filter(|&k| !scene.is_fixed(k)).count(), movers, "{objects}");
+    }
+}
+
+#[test]
+fn churn_replaces_one_object_in_a_hundred() {
+    for (objects, replaced) in [(1, 1), (30, 1), (2000, 20)] {
+        let mut scene = Scenario::Churn.start(objects, 4);
+        let mut moved = 0;
+        for _ in 0..20 {
+            let before = scene.boxes().to_vec();
+            scene.advance();
+            let near = |a: &Aabb, b: &Aabb| (0..3).all(|k| (a.min[k] - b.min[k]).abs() <= 0.0501);
+            let stayed = &scene.boxes()[..objects - replaced];
+            assert!(stayed.iter().all(|now| before.iter().any(|then| near(now, then))), "{objects}");
+            // A gap is filled with the last object.
+            let filled = stayed.iter().zip(&before).filter(|(now, then)| !near(now, then)).count();
+            assert!(filled <= replaced, "{objects}: {filled}");
+            moved += filled + scene.boxes().iter().zip(&before).skip(stayed.len()).filter(|(a, b)| !near(a, b)).count();
+        }
+        assert!(moved > 10 * replaced, "{objects}: {moved}");
+    }
+}
+
+#[test]
+fn sheets_and_long_rods_cross_the_world() {
+    for scenario in [Scenario::Sheets, Scenario::LongRods] {
+        let mut scene = scenario.start(2000, 3);
+        advance(&mut scene, 100);
+        let (low, high) = scene.boxes().iter().fold((f32::MAX, f32::MIN), |(low, high), b| {
+            (low.min(b.min[0]).min(b.min[1]), high.max(b.max[0]).max(b.max[1]))
+        });
+        for b in scene.boxes() {
+            let wide = (0..3).filter(|&a| b.max[a] - b.min[a] > 0.99 * (high - low)).count();
+            let thin = (0..3).filter(|&a| b.max[a] - b.min[a] < 0.001 * (high - low)).count();
+            assert_eq!((wide, thin), if scenario == Scenario::Sheets { (2, 1) } else { (1, 2) }, "{scenario}");
+        }
     }
 }
 

@@ -1,8 +1,9 @@
 //! Objects that walk about their homes: the hard scenes with few pairs.
 //!
-//! `parked`, `stations`, `layers`, `plates`, `rods`, `static-world`, `asleep`, `tower`, `aliased`, `teleport`.
+//! `parked`, `stations`, `layers`, `plates`, `rods`, `static-world`, `asleep`, `tower`, `aliased`, `teleport`, `sheets`,
+//! `long-rods`, `beams`, `city`.
 
-use super::rng::{Rng, cube_root};
+use super::rng::{Powers, Rng, cube_root};
 use super::walk::reflect;
 use sapwise::Aabb;
 
@@ -12,6 +13,10 @@ const STEP: f32 = 0.05;
 const JUMP_FRAMES: u64 = 30;
 /// Half the edge of a cube.
 const HALF: f32 = 0.5;
+/// Shapes of beams. Their lengths are spread evenly, so that each seed has as many pairs.
+const BEAMS: usize = 240;
+/// Shapes of buildings.
+const BUILDINGS: usize = 240;
 
 /// Objects of a few kinds. Each walks about its own home between walls that reflect its centre.
 #[derive(Debug, Clone, Default)]
@@ -272,6 +277,84 @@ impl Roam {
         (0..objects).for_each(|_| roam.add(0, [0.0; 3], rng));
         roam.jumps = true;
         roam
+    }
+
+    /// Sheets as wide as the world at random heights.
+    pub(super) fn sheets(objects: usize, rng: &mut Rng) -> Self {
+        let wall = cube_root(objects as f64) as f32;
+        let gap = 2.0 * wall / objects.max(1) as f32;
+        // As many pairs per object as the mean thickness has gaps: 0.1.
+        let sheet = |thickness: f32| Kind {
+            half: [wall, wall, 0.5 * thickness * gap],
+            walls: [0.0, 0.0, wall],
+            step: 0.25 * gap,
+        };
+        let mut roam = Self::new(objects, vec![sheet(0.0), sheet(0.2)]);
+        (0..objects).for_each(|k| roam.add(k % 2, [0.0; 3], rng));
+        roam
+    }
+
+    /// Rods as long as the world, each along a random axis.
+    pub(super) fn long_rods(objects: usize, rng: &mut Rng) -> Self {
+        let wall = cube_root(objects as f64) as f32;
+        // Rods of two axes pass each other on the third: with a thickness of t world edges, n rods have 2 n^2 t / 3
+        // pairs, 0.75 per object.
+        let half = 1.125 * wall / objects.max(1) as f32;
+        let rod = |along: usize| {
+            let of = |own: f32, other: f32| [0, 1, 2].map(|axis| if axis == along { own } else { other });
+            Kind { half: of(wall, half), walls: of(0.0, wall), step: 0.5 * half }
+        };
+        let mut roam = Self::new(objects, [0, 1, 2].map(rod).to_vec());
+        for _ in 0..objects {
+            let along = rng.below(3);
+            roam.add(along, [0.0; 3], rng);
+        }
+        roam
+    }
+
+    /// One object in ten has the bounds of a beam in a random direction.
+    pub(super) fn beams(objects: usize, rng: &mut Rng) -> Self {
+        // The mean volume in which two of these objects overlap is 1470: 0.3 pairs, and fewer at the walls, need a
+        // world of 2450 per object.
+        let wall = (cube_root(2450.0 * objects as f64) * 0.5) as f32;
+        let lengths = Powers::new(100.0);
+        let beam = |k: usize| {
+            let along = rng.gauss3();
+            let norm = along.iter().map(|a| a * a).sum::<f32>().sqrt();
+            let length = lengths.of((k as f32 + 0.5) / BEAMS as f32) as f32;
+            Kind { half: along.map(|a| 0.5 * length * a.abs() / norm + 0.1), ..Kind::cubes([wall; 3]) }
+        };
+        let mut kinds: Vec<Kind> = (0..BEAMS).map(beam).collect();
+        kinds.push(Kind::cubes([wall; 3]));
+        let mut roam = Self::new(objects, kinds);
+        let mut scattered = Scattered::one_in(10);
+        for k in 0..objects {
+            let kind = if scattered.is(k, rng) { rng.below(BEAMS) } else { BEAMS };
+            roam.add(kind, [0.0; 3], rng);
+        }
+        roam
+    }
+
+    /// Fixed buildings on a lattice, and up to 2000 objects that move between and in them.
+    pub(super) fn city(objects: usize, rng: &mut Rng) -> Self {
+        let movers = (objects / 20).min(2000);
+        let side = ((objects - movers) as f64).sqrt().ceil() as usize;
+        let wall = side as f32;
+        let building = |_| {
+            let [x, y, z] = [(); 3].map(|()| rng.unit());
+            Kind::fixed([0.6 + 0.7 * x, 0.6 + 0.7 * y, 0.5 + 9.5 * z])
+        };
+        let mut kinds: Vec<Kind> = (0..BUILDINGS).map(building).collect();
+        kinds.push(Kind::cubes([wall, wall, 10.0]));
+        let mut roam = Self::new(objects, kinds);
+        for k in 0..objects - movers {
+            let kind = rng.below(BUILDINGS);
+            let [x, y] = [k % side, k / side].map(|at| 2.0 * at as f32 - wall);
+            let height = roam.kinds[kind].half[2];
+            roam.add(kind, [x, y, height], rng);
+        }
+        (0..movers).for_each(|_| roam.add(BUILDINGS, [0.0, 0.0, 10.0], rng));
+        roam.shuffled(rng)
     }
 
     /// Writes the boxes of all objects.

@@ -61,6 +61,11 @@ impl Scene {
             Scenario::Tower => Motion::Roam(Roam::tower(objects, &mut rng)),
             Scenario::Aliased => Motion::Roam(Roam::aliased(objects, &mut rng)),
             Scenario::Teleport => Motion::Roam(Roam::teleport(objects, &mut rng)),
+            Scenario::Churn => Motion::Walk(Walk::churn(objects, STEP, &mut rng)),
+            Scenario::Sheets => Motion::Roam(Roam::sheets(objects, &mut rng)),
+            Scenario::LongRods => Motion::Roam(Roam::long_rods(objects, &mut rng)),
+            Scenario::Beams => Motion::Roam(Roam::beams(objects, &mut rng)),
+            Scenario::City => Motion::Roam(Roam::city(objects, &mut rng)),
         };
         match &mut motion {
             Motion::Walk(m) => m.place(&mut boxes),
@@ -83,7 +88,7 @@ impl Scene {
     /// Goes on to the next frame. Allocates nothing.
     ///
     /// An object keeps its index from frame to frame, except in [`Scenario::Fragmentation`], where objects come and
-    /// go at the end of the list.
+    /// go at the end of the list, and in [`Scenario::Churn`].
     pub fn advance(&mut self) {
         self.frame += 1;
         let (rng, boxes) = (&mut self.rng, &mut self.boxes);

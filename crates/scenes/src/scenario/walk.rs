@@ -1,4 +1,4 @@
-//! Objects that take a random step each frame: `uniform`, `fast`, `slab`, `mixed`, `resting`.
+//! Objects that take a random step each frame: `uniform`, `fast`, `slab`, `mixed`, `resting`, `churn`.
 
 use super::rng::{Powers, Rng, cube_root};
 use sapwise::Aabb;
@@ -19,6 +19,8 @@ pub(super) struct Walk {
     fixed: usize,
     /// One object of this many moves in a frame.
     sparsity: usize,
+    /// Objects that others replace in a frame, all of one size.
+    replaced: usize,
 }
 
 impl Walk {
@@ -26,6 +28,11 @@ impl Walk {
     pub(super) fn uniform(objects: usize, step: f32, sparsity: usize, rng: &mut Rng) -> Self {
         let wall = cube_root(objects as f64) as f32;
         Self::unit_cubes(objects, [wall; 3], step, sparsity, rng)
+    }
+
+    /// [`Walk::uniform`], with one object in 100 replaced in each frame.
+    pub(super) fn churn(objects: usize, step: f32, rng: &mut Rng) -> Self {
+        Self { replaced: objects.div_ceil(100), ..Self::uniform(objects, step, 1, rng) }
     }
 
     /// Unit cubes with the density of [`Walk::uniform`], one in eight units of volume, in a world eight edges high.
@@ -63,13 +70,20 @@ impl Walk {
             step: step * 2.0,
             fixed: 0,
             sparsity: 1,
+            replaced: 0,
         };
         for _ in 0..objects {
-            let u = rng.signed3();
-            walk.centres.push([u[0] * walls[0], u[1] * walls[1], u[2] * walls[2]]);
+            let centre = walk.anywhere(rng);
+            walk.centres.push(centre);
             walk.halves.push(half(rng));
         }
         walk
+    }
+
+    /// Returns a random place between the walls.
+    fn anywhere(&self, rng: &mut Rng) -> [f32; 3] {
+        let u = rng.signed3();
+        [0, 1, 2].map(|a| u[a] * self.walls[a])
     }
 
     /// Writes the boxes of all objects.
@@ -85,6 +99,14 @@ impl Walk {
 
     /// Steps into `frame` and rewrites the boxes of the objects that moved.
     pub(super) fn advance(&mut self, frame: u64, rng: &mut Rng, boxes: &mut [Aabb]) {
+        for _ in 0..self.replaced {
+            let leaves = rng.below(self.centres.len());
+            self.centres.swap_remove(leaves);
+        }
+        for _ in 0..self.replaced {
+            let centre = self.anywhere(rng);
+            self.centres.push(centre);
+        }
         let phase = (frame / AWAKE_FRAMES % self.sparsity as u64) as usize;
         let objects = self.centres.iter_mut().zip(&self.halves).zip(boxes);
         for ((centre, &half), aabb) in objects.skip(self.fixed.max(phase)).step_by(self.sparsity) {
