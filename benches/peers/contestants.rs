@@ -1,11 +1,15 @@
 //! Who takes part.
 
+use crate::ground::{Ground, Grounded};
 use crate::naive::Naive;
-use crate::obvhs_tree::Obvhs;
+use crate::obvhs_tree::{Moving, Obvhs};
 use crate::parry::{Margin, ParallelParry, Parry, Upkeep};
-use crate::rtree::Packed;
+use crate::rtree::{Packed, Rtree};
+use obvhs::bvh2::Bvh2;
+use parry3d::partitioning::Bvh;
 use rayon::ThreadPool;
 use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Pairs, Registry, Tuning};
+use sapwise_scenes::Scenario;
 use std::sync::Arc;
 
 /// A side of the comparison.
@@ -41,6 +45,21 @@ impl Contestant {
     fn peer(name: &str, keeps: bool, most: usize, algorithm: impl BroadPhase + 'static) -> Self {
         let algorithm = Algorithm::Other(Box::new(algorithm));
         Self { name: name.to_owned(), side: Side::Peer, keeps, most, hopeless_frames: 0, algorithm }
+    }
+
+    /// The same with a tree for the boxes that are declared fixed.
+    fn grounded<G: Ground + 'static>(
+        name: &str,
+        keeps: bool,
+        most: usize,
+        algorithm: impl BroadPhase + 'static,
+    ) -> Self {
+        Self::peer(name, keeps, most, Grounded::<G, _>::new(algorithm))
+    }
+
+    /// The name without the number of threads.
+    pub(crate) fn short_name(&self) -> &str {
+        self.name.split(['@', '(']).next().unwrap_or_default().trim_end()
     }
 
     /// A method of ours. Those whose time grows faster than the number of objects leave where they are far behind.
@@ -87,26 +106,30 @@ pub(crate) fn ours(registry: &Registry, tuning: &Tuning) -> Result<Vec<Contestan
 }
 
 /// The peers on one thread; with a pool those of them that are fastest there, beside all that have a parallel form.
-pub(crate) fn peers(pool: Option<&Arc<ThreadPool>>) -> Vec<Contestant> {
+pub(crate) fn peers(pool: Option<&Arc<ThreadPool>>, scenario: Scenario) -> Vec<Contestant> {
     let all = usize::MAX;
+    // Trees that take long for many boxes that move. In `city` few do.
+    let most = if scenario == Scenario::City { all } else { 100_000 };
     let mut peers = vec![
-        Contestant::peer("parry3d refit", true, all, Parry::new(Upkeep::Refit)),
-        Contestant::peer("parry3d optimise", true, all, Parry::new(Upkeep::Optimise)),
-        Contestant::peer("parry3d margin", true, all, Margin::new()),
+        Contestant::grounded::<Bvh>("parry3d refit", true, all, Parry::new(Upkeep::Refit)),
+        Contestant::grounded::<Bvh>("parry3d optimise", true, all, Parry::new(Upkeep::Optimise)),
+        Contestant::grounded::<Bvh>("parry3d margin", true, all, Margin::new()),
     ];
     match pool {
         None => peers.extend([
-            Contestant::peer("parry3d rebuild", false, all, Parry::new(Upkeep::Rebuild)),
-            Contestant::peer("obvhs rebuild", false, 100_000, Obvhs::rebuilding(None)),
-            Contestant::peer("obvhs refit", true, 100_000, Obvhs::refitting()),
-            Contestant::peer("rstar", false, 100_000, Packed),
+            Contestant::grounded::<Bvh>("parry3d rebuild", false, all, Parry::new(Upkeep::Rebuild)),
+            Contestant::grounded::<Bvh2>("obvhs rebuild", false, most, Obvhs::rebuilding(None)),
+            Contestant::grounded::<Bvh2>("obvhs refit", true, most, Obvhs::refitting()),
+            Contestant::grounded::<Bvh2>("obvhs move", true, most, Moving::new()),
+            Contestant::grounded::<Rtree>("rstar", false, most, Packed),
             Contestant::peer("double loop", false, 3_000, Naive),
         ]),
+        // Without a tree for fixed boxes: `city` runs on one thread.
         Some(pool) => peers.extend([
-            Contestant::peer("parry3d refit, 2 threads", true, all, ParallelParry::new(Upkeep::Refit, pool)),
-            Contestant::peer("parry3d optimise, 2 threads", true, all, ParallelParry::new(Upkeep::Optimise, pool)),
-            Contestant::peer("parry3d rebuild, 2 threads", false, all, ParallelParry::new(Upkeep::Rebuild, pool)),
-            Contestant::peer("obvhs rebuild, 2 threads", false, 100_000, Obvhs::rebuilding(Some(pool))),
+            Contestant::peer("parry3d refit (2 threads)", true, all, ParallelParry::new(Upkeep::Refit, pool)),
+            Contestant::peer("parry3d optimise (2 threads)", true, all, ParallelParry::new(Upkeep::Optimise, pool)),
+            Contestant::peer("parry3d rebuild (2 threads)", false, all, ParallelParry::new(Upkeep::Rebuild, pool)),
+            Contestant::peer("obvhs rebuild (2 threads)", false, most, Obvhs::rebuilding(Some(pool))),
         ]),
     }
     peers

@@ -10,7 +10,9 @@
 //! | `SAPWISE_SCENARIOS` | scenarios, separated by commas |
 //! | `SAPWISE_SIZES` | numbers of objects |
 //! | `SAPWISE_THREADS` | `1`, `2` or `1,2` |
-//! | `SAPWISE_BENCH_SECONDS` | time for the timed frames of a scenario at a size |
+//! | `SAPWISE_CONTESTANTS` | who takes part: `adaptive,bvh,parry3d refit`; `bvh` is `bvh@cpu1` and `bvh@cpu2` |
+//! | `SAPWISE_BENCH_SECONDS` | time for the timed frames of a scenario at a size `[default: 6]` |
+//! | `SAPWISE_TAIL_SECONDS` | time for the slowest frames of a scenario at a size, 0 for none `[default: 30]` |
 //! | `SAPWISE_RESULTS` | folder for `peers.csv` and `peers.md`; without it the ratios are printed |
 //!
 //! Method and bias stand at the head of `BENCHMARKS.md`. Prints a line for each scenario and size as soon as it is
@@ -26,6 +28,7 @@ mod contestants;
 )]
 #[path = "../../probes/src/date.rs"]
 mod date;
+mod ground;
 mod machine;
 mod naive;
 mod obvhs_tree;
@@ -35,8 +38,9 @@ mod race;
 mod rtree;
 mod settings;
 mod table;
+mod tails;
 
-use contestants::{ours, peers};
+use contestants::{Contestant, ours, peers};
 use point::Point;
 use sapwise::Registry;
 use sapwise_scenes::Scenario;
@@ -50,17 +54,29 @@ const FEWEST_FOR_TWO: usize = 1_000;
 
 /// Runs a race and says how it went.
 fn measured(
-    contestants: Vec<contestants::Contestant>,
+    make: &dyn Fn() -> Result<Vec<Contestant>, String>,
     scenario: Scenario,
     objects: usize,
     settings: &Settings,
 ) -> Result<Point, String> {
     let start = Instant::now();
-    let point = race::race(contestants, scenario, objects, settings)?;
+    let told = |e| format!("{scenario} at {objects} objects: {e}");
+    let point = race::race(make, scenario, objects, settings).map_err(told)?;
     println!("{}, {:.1} s", table::line(&point), start.elapsed().as_secs_f64());
     // A run that is cut short keeps what it has printed. Whoever stopped listening gets no more.
     let _ = std::io::stdout().flush();
     Ok(point)
+}
+
+/// Those of some names, or all.
+fn chosen(mut all: Vec<Contestant>, names: &[String]) -> Result<Vec<Contestant>, String> {
+    let is = |c: &Contestant, name: &String| c.name == *name || c.short_name() == name;
+    if let Some(name) = names.iter().find(|name| !all.iter().any(|c| is(c, name))) {
+        let known: Vec<&str> = all.iter().map(Contestant::short_name).collect();
+        return Err(format!("SAPWISE_CONTESTANTS: nobody is called {name:?}; use some of {}", known.join(", ")));
+    }
+    all.retain(|c| names.is_empty() || names.iter().any(|name| is(c, name)));
+    Ok(all)
 }
 
 /// All scenarios on one thread, or `uniform` on several.
@@ -71,13 +87,20 @@ fn compare(threads: u32, settings: &Settings) -> Result<Vec<Point>, String> {
     let tuning = machine::tuning(&registry, threads, settings)?;
     let pool = if threads > 1 { Some(machine::pinned_pool(threads as usize)?) } else { None };
     let mut points = Vec::new();
+    let everyone = |scenario| {
+        let mut all = ours(&registry, &tuning).map_err(|e| e.to_string())?;
+        all.extend(peers(pool.as_ref(), scenario));
+        chosen(all, &settings.contestants)
+    };
     for &scenario in settings.scenarios.iter().filter(|s| threads == 1 || **s == Scenario::Uniform) {
         let mut gone: Vec<String> = Vec::new();
         for &objects in settings.sizes.iter().filter(|n| threads == 1 || **n >= FEWEST_FOR_TWO || !settings.full) {
-            let mut all = ours(&registry, &tuning).map_err(|e| e.to_string())?;
-            all.extend(peers(pool.as_ref()));
-            all.retain(|c| !gone.contains(&c.name));
-            let point = measured(all, scenario, objects, settings)?;
+            let make = || {
+                let mut all = everyone(scenario)?;
+                all.retain(|c| !gone.contains(&c.name));
+                Ok(all)
+            };
+            let point = measured(&make, scenario, objects, settings)?;
             gone.extend(point.left.iter().cloned());
             points.push(point);
         }

@@ -3,6 +3,8 @@
 //! Its feature `parallel` spreads the build over rayon's threads and changes the sort on one thread too, so that one
 //! program can't have both forms; it is off. On two threads the queries are spread here, and the build stays on one.
 
+use crate::ground::Ground;
+use crate::parry::margin;
 use obvhs::aabb::Aabb as Bounds;
 use obvhs::bvh2::Bvh2;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
@@ -38,7 +40,7 @@ impl Obvhs {
     }
 
     fn update(&mut self, boxes: &[Aabb]) {
-        let bounds = boxes.iter().map(|b| Bounds::new(b.min.into(), b.max.into()));
+        let bounds = boxes.iter().map(|b| bounds(b, 0.0));
         if self.refits && self.tree.primitives_to_nodes.len() == boxes.len() {
             for (b, &node) in bounds.zip(&self.tree.primitives_to_nodes) {
                 self.tree.nodes[node as usize].set_aabb(b);
@@ -47,27 +49,54 @@ impl Obvhs {
         }
         self.bounds.clear();
         self.bounds.extend(bounds);
-        let mut indices = std::mem::take(&mut self.tree.primitive_indices);
-        indices.clear();
-        indices.extend(0..boxes.len() as u32);
-        let (distance, precision) = (PlocSearchDistance::Minimum, SortPrecision::U64);
-        self.builder.build_with_bvh(&mut self.tree, distance, &self.bounds, indices, precision, 0);
+        build(&mut self.builder, &mut self.tree, &self.bounds);
         if self.refits {
             self.tree.init_primitives_to_nodes_if_uninit();
         }
     }
 }
 
-/// The pairs of the leaves among some nodes with leaves of higher primitives. Each leaf holds one primitive.
+/// A box with a margin on each side.
+fn bounds(b: &Aabb, margin: f32) -> Bounds {
+    Bounds::new(b.min.map(|v| v - margin).into(), b.max.map(|v| v + margin).into())
+}
+
+/// Builds the tree anew in its own memory.
+fn build(builder: &mut PlocBuilder, tree: &mut Bvh2, bounds: &[Bounds]) {
+    let mut indices = std::mem::take(&mut tree.primitive_indices);
+    indices.clear();
+    indices.extend(0..bounds.len() as u32);
+    builder.build_with_bvh(tree, PlocSearchDistance::Minimum, bounds, indices, SortPrecision::U64, 0);
+}
+
+/// The primitives whose leaves touch some bounds. Each leaf holds one primitive.
+fn touching(tree: &Bvh2, bounds: Bounds, mut found: impl FnMut(u32)) {
+    tree.aabb_traverse(bounds, |tree, at| {
+        found(tree.primitive_indices[tree.nodes[at as usize].first_index as usize]);
+        true
+    });
+}
+
+impl Ground for Bvh2 {
+    fn build(boxes: &[Aabb]) -> Self {
+        let (mut tree, bounds) = (Self::default(), boxes.iter().map(|b| bounds(b, 0.0)).collect::<Vec<_>>());
+        build(&mut PlocBuilder::new(), &mut tree, &bounds);
+        tree
+    }
+
+    fn query(&self, b: &Aabb, found: impl FnMut(u32)) {
+        touching(self, bounds(b, 0.0), found);
+    }
+}
+
+/// The pairs of the leaves among some nodes with leaves of higher primitives.
 fn query(tree: &Bvh2, nodes: std::ops::Range<usize>, mut pair: impl FnMut(u32, u32)) {
     for node in tree.nodes[nodes].iter().filter(|n| n.is_leaf()) {
         let id = tree.primitive_indices[node.first_index as usize];
-        tree.aabb_traverse(*node.aabb(), |tree, at| {
-            let other = tree.primitive_indices[tree.nodes[at as usize].first_index as usize];
+        touching(tree, *node.aabb(), |other| {
             if id < other {
                 pair(id, other);
             }
-            true
         });
     }
 }
@@ -89,6 +118,79 @@ impl BroadPhase for Obvhs {
             });
         });
         self.found.iter().flatten().for_each(|&(a, b)| pairs.push(a, b));
+        pairs.finish()
+    }
+}
+
+/// The scheme of its example `physics` with `Bvh2::move_primitive`: leaves with a margin, each moved in the tree when
+/// its box leaves it. As in parry3d's scheme, near pairs are kept, and only leaves that moved are queried.
+pub(crate) struct Moving {
+    builder: PlocBuilder,
+    tree: Bvh2,
+    leaves: Vec<Bounds>,
+    moved: Vec<bool>,
+    near: Vec<(u32, u32)>,
+}
+
+impl Moving {
+    pub(crate) fn new() -> Self {
+        let (builder, tree) = (PlocBuilder::new(), Bvh2::default());
+        Self { builder, tree, leaves: Vec::new(), moved: Vec::new(), near: Vec::new() }
+    }
+
+    /// Puts every box into a leaf that holds it, and notes which leaves are new.
+    fn update(&mut self, boxes: &[Aabb]) {
+        let (before, now) = (self.leaves.len(), boxes.len());
+        self.moved.clear();
+        if before.abs_diff(now) > now / 4 {
+            self.leaves.clear();
+            self.leaves.extend(boxes.iter().map(|b| bounds(b, margin(b))));
+            self.moved.resize(now, true);
+            build(&mut self.builder, &mut self.tree, &self.leaves);
+            return;
+        }
+        (now..before).for_each(|k| self.tree.remove_primitive(k as u32));
+        self.leaves.truncate(now);
+        self.moved.resize(now, false);
+        for (k, b) in boxes.iter().enumerate() {
+            let tight = bounds(b, 0.0);
+            let held = |leaf: &Bounds| leaf.min.min(tight.min) == leaf.min && leaf.max.max(tight.max) == leaf.max;
+            if self.leaves.get(k).is_some_and(held) {
+                continue;
+            }
+            let leaf = bounds(b, margin(b));
+            self.moved[k] = true;
+            if k < self.leaves.len() {
+                self.tree.move_primitive(leaf, k as u32);
+                self.leaves[k] = leaf;
+            } else {
+                self.tree.insert_primitive(leaf, k as u32);
+                self.leaves.push(leaf);
+            }
+        }
+    }
+}
+
+impl BroadPhase for Moving {
+    fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        pairs.clear();
+        self.update(boxes);
+        let (moved, near) = (&self.moved, &mut self.near);
+        // One that is gone counts as moved.
+        let stays = |k: u32| moved.get(k as usize) == Some(&false);
+        near.retain(|&(a, b)| stays(a) && stays(b));
+        for (k, leaf) in (0..).zip(&self.leaves).filter(|&(k, _)| !stays(k)) {
+            touching(&self.tree, *leaf, |other| {
+                if k < other || k > other && stays(other) {
+                    near.push((k, other));
+                }
+            });
+        }
+        for &(a, b) in near.iter() {
+            if boxes[a as usize].overlaps(&boxes[b as usize]) {
+                pairs.push(a, b);
+            }
+        }
         pairs.finish()
     }
 }

@@ -1,5 +1,6 @@
 //! parry3d's `Bvh`, which rapier builds on.
 
+use crate::ground::Ground;
 use parry3d::bounding_volume::{Aabb as Bounds, BoundingVolume};
 use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhLeafUpdateStatus, BvhWorkspace};
 use rayon::ThreadPool;
@@ -29,12 +30,22 @@ fn bounds(b: &Aabb) -> Bounds {
     Bounds::new(b.min.into(), b.max.into())
 }
 
+impl Ground for Bvh {
+    fn build(boxes: &[Aabb]) -> Self {
+        Self::from_iter(BvhBuildStrategy::Binned, boxes.iter().map(bounds).enumerate())
+    }
+
+    fn query(&self, b: &Aabb, found: impl FnMut(u32)) {
+        self.intersect_aabb(&bounds(b)).for_each(found);
+    }
+}
+
 /// Makes the leaves as many as the boxes: a new tree where more than `few` come or go, since one by one they take
 /// longer; else those beyond the last box are removed, and new ones are inserted when they are updated.
 fn resize(tree: &mut Bvh, boxes: &[Aabb], few: usize) {
     let (before, now) = (tree.leaf_count() as usize, boxes.len());
     if before.abs_diff(now) > few {
-        *tree = Bvh::from_iter(BvhBuildStrategy::Binned, boxes.iter().map(bounds).enumerate());
+        *tree = Bvh::build(boxes);
     } else {
         (now..before).for_each(|k| tree.remove(k as u32));
     }
@@ -120,9 +131,14 @@ impl BroadPhase for ParallelParry {
     }
 }
 
-/// Leaves larger than their boxes by this share of the box's edge on each side. In `uniform` and `resting` half of it
+/// Leaves larger than their boxes by this share of the box's shortest edge on each side. In `uniform` and `resting` half of it
 /// is slower or as fast.
 const MARGIN: f32 = 0.2;
+
+/// The margin about a box: no wider for a sheet or a rod, whose leaf would touch many others.
+pub(crate) fn margin(b: &Aabb) -> f32 {
+    (0..3).map(|a| b.max[a] - b.min[a]).fold(f32::INFINITY, f32::min) * MARGIN
+}
 
 /// Frames from one step of `optimize_incremental` to the next: parry's documentation asks for 5 to 10; in each frame
 /// is slower in `uniform` and `resting`.
@@ -148,7 +164,6 @@ impl Margin {
 impl BroadPhase for Margin {
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
         pairs.clear();
-        let margin = |b: &Aabb| (b.max[0] - b.min[0]) * MARGIN;
         if self.changed.len() != boxes.len() {
             let leaves = boxes.iter().map(|b| bounds(b).loosened(margin(b))).enumerate();
             self.tree = Bvh::from_iter(BvhBuildStrategy::Binned, leaves);

@@ -1,6 +1,6 @@
 //! What was measured of one scenario at one size.
 
-use crate::contestants::Side;
+use crate::contestants::{Contestant, Side};
 use sapwise::internals::stats::quantile;
 use sapwise_scenes::Scenario;
 
@@ -8,8 +8,25 @@ use sapwise_scenes::Scenario;
 pub(crate) struct Lane {
     pub(crate) name: String,
     pub(crate) side: Side,
+    /// Whether it keeps something from frame to frame.
+    pub(crate) keeps: bool,
     /// Seconds of each timed frame.
     pub(crate) seconds: Vec<f64>,
+    pub(crate) tail: Option<Tail>,
+}
+
+/// A long stream of frames, run several times.
+pub(crate) struct Tail {
+    /// Of each frame the median over the runs.
+    pub(crate) seconds: Vec<f64>,
+    pub(crate) runs: usize,
+}
+
+impl Tail {
+    /// Median, 99th percentile and slowest frame, in seconds.
+    pub(crate) fn quantiles(&self) -> [f64; 3] {
+        [0.5, 0.99, 1.0].map(|q| quantile(&self.seconds, q).unwrap_or(f64::NAN))
+    }
 }
 
 /// All contestants of a race that were there to the end, so that all have the same frames.
@@ -32,6 +49,12 @@ fn quartiles(samples: &[f64]) -> Quartiles {
 }
 
 impl Lane {
+    /// Nothing is timed yet.
+    pub(crate) fn of(contestant: &Contestant) -> Self {
+        let Contestant { name, side, keeps, .. } = contestant;
+        Self { name: name.clone(), side: *side, keeps: *keeps, seconds: Vec::new(), tail: None }
+    }
+
     /// Of the seconds.
     pub(crate) fn quartiles(&self) -> Quartiles {
         quartiles(&self.seconds)

@@ -3,7 +3,8 @@
 use crate::contestants::Contestant;
 use crate::point::{Lane, Point};
 use crate::settings::Settings;
-use sapwise::{Aabb, Pairs};
+use crate::tails;
+use sapwise::{Filter, Membership, Pairs};
 use sapwise_scenes::{Random, Scenario, Scene};
 use sapwise_tune::measure::Watch;
 use std::hint::black_box;
@@ -36,17 +37,34 @@ const FEWEST_FRAMES: usize = 5;
 const MOST_FRAMES: [usize; 2] = [400, 60];
 
 /// Those who race, and what they share.
-struct Race {
-    contestants: Vec<Contestant>,
+pub(crate) struct Race {
+    pub(crate) contestants: Vec<Contestant>,
+    pub(crate) scene: Scene,
     /// One list for all, so that its memory is equally warm for each.
     pairs: Pairs,
     random: Random,
 }
 
+/// The filter of a scene: in `city` objects are declared fixed.
+fn filter(scene: &Scene) -> Option<Filter> {
+    let membership = |k| Membership { fixed: scene.is_fixed(k), ..Membership::ALL };
+    (scene.scenario() == Scenario::City).then(|| Filter::new((0..scene.boxes().len()).map(membership).collect()))
+}
+
 impl Race {
-    /// Runs all, or only those who keep something, on these boxes in random order. The time that each of them took,
-    /// and `None` for those who did not run.
-    fn frame(&mut self, boxes: &[Aabb], all: bool) -> Result<Vec<Option<Duration>>, String> {
+    pub(crate) fn new(contestants: Vec<Contestant>, scene: Scene, seed: u64) -> Self {
+        let mut pairs = Pairs::new();
+        pairs.set_filter(filter(&scene));
+        Self { contestants, scene, pairs, random: Random::new(seed) }
+    }
+
+    /// Runs all, or only those who keep something, on the frame of the scene in random order. The time that each of
+    /// them took, and `None` for those who did not run.
+    ///
+    /// # Errors
+    /// When a contestant fails or finds other pairs than the rest.
+    pub(crate) fn frame(&mut self, all: bool) -> Result<Vec<Option<Duration>>, String> {
+        let boxes = self.scene.boxes();
         let mut taken = vec![None; self.contestants.len()];
         let mut expected: Option<u64> = None;
         for at in self.random.shuffled(self.contestants.len()) {
@@ -66,8 +84,22 @@ impl Race {
         Ok(taken)
     }
 
+    /// Runs the frames before the timed ones. Returns the names of those who left.
+    ///
+    /// # Errors
+    /// As in [`Race::frame`].
+    pub(crate) fn warm_up(&mut self, frames: u64) -> Result<Vec<String>, String> {
+        let mut left = Vec::new();
+        for frame in 0..frames {
+            self.scene.advance();
+            let taken = self.frame(frame + WARM_UP_OF_ALL >= frames)?;
+            left.extend(self.leave_out_slow(&taken));
+        }
+        Ok(left)
+    }
+
     /// Takes those out who take too long, and returns their names.
-    fn leave_out_slow(&mut self, taken: &[Option<Duration>]) -> Vec<String> {
+    pub(crate) fn leave_out_slow(&mut self, taken: &[Option<Duration>]) -> Vec<String> {
         let fastest = taken.iter().flatten().min().copied().unwrap_or_default();
         let hopeless = HOPELESS_FRAME.max(fastest * HOPELESS_RATIO);
         let mut taken = taken.iter().map(|took| took.unwrap_or_default());
@@ -90,11 +122,11 @@ fn first_peak(scenario: Scenario) -> u64 {
 }
 
 /// Only in `fragmentation` the number of objects changes. Times of different numbers can't be put together.
-fn is_at_peak(scene: &Scene) -> bool {
+pub(crate) fn is_at_peak(scene: &Scene) -> bool {
     scene.boxes().len() == scene.peak_objects()
 }
 
-/// Runs the contestants through a scenario at a size.
+/// Runs the contestants through a scenario at a size, then again for their slowest frames.
 ///
 /// The scene goes on from frame to frame, so that who keeps the work of the last frame finds objects where they never
 /// were before. In `fragmentation` the frames at the peak are timed; those who keep something go through the others
@@ -103,36 +135,30 @@ fn is_at_peak(scene: &Scene) -> bool {
 /// # Errors
 /// When a contestant fails or finds other pairs than the rest.
 pub(crate) fn race(
-    contestants: Vec<Contestant>,
+    make: &dyn Fn() -> Result<Vec<Contestant>, String>,
     scenario: Scenario,
     objects: usize,
     settings: &Settings,
 ) -> Result<Point, String> {
-    let told = |e| format!("{scenario} at {objects} objects: {e}");
-    let mut race = Race { contestants, pairs: Pairs::new(), random: Random::new(SEED) };
-    race.contestants.retain(|c| objects <= c.most);
-    let mut scene = scenario.start(objects, SEED);
     let warm_up = if settings.full { WARM_UP } else { WARM_UP_OF_ALL };
+    let mut begin = scenario.start(objects, SEED);
     let peak = first_peak(scenario);
-    while scene.frame() + warm_up + 1 < peak {
-        scene.advance();
+    while begin.frame() + warm_up + 1 < peak {
+        begin.advance();
     }
-    let mut left = Vec::new();
-    for frame in 0..warm_up {
-        scene.advance();
-        let taken = race.frame(scene.boxes(), frame + WARM_UP_OF_ALL >= warm_up).map_err(told)?;
-        left.extend(race.leave_out_slow(&taken));
-    }
-    let lane = |c: &Contestant| Lane { name: c.name.clone(), side: c.side, seconds: Vec::new() };
-    let lanes = race.contestants.iter().map(lane).collect();
+    let mut contestants = make()?;
+    contestants.retain(|c| objects <= c.most);
+    let mut race = Race::new(contestants, begin.clone(), SEED);
+    let left = race.warm_up(warm_up)?;
+    let lanes = race.contestants.iter().map(Lane::of).collect();
     let mut point = Point { scenario, objects, lanes, left, foreign_load: None };
     let watch = Watch::begin();
     let most = if settings.full { MOST_FRAMES[usize::from(objects > 1_000)] } else { FEWEST_FRAMES };
     let (started, mut frames) = (Instant::now(), 0);
     while frames < most && (frames < FEWEST_FRAMES || started.elapsed() < settings.time) {
-        scene.advance();
-        let timed = is_at_peak(&scene);
-        let taken = race.frame(scene.boxes(), timed).map_err(told)?;
+        race.scene.advance();
+        let timed = is_at_peak(&race.scene);
+        let taken = race.frame(timed)?;
         if timed {
             frames += 1;
             for (lane, took) in point.lanes.iter_mut().zip(taken.into_iter().flatten()) {
@@ -141,5 +167,9 @@ pub(crate) fn race(
         }
     }
     point.foreign_load = watch.is_long_enough().then(|| watch.foreign_load()).flatten();
+    drop(race);
+    if !settings.tail_time.is_zero() {
+        tails::measure(make, &begin, warm_up, &mut point, settings)?;
+    }
     Ok(point)
 }

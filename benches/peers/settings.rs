@@ -6,17 +6,8 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
 
-/// Measured beside the hard ones.
-const SCENARIOS: [Scenario; 8] = [
-    Scenario::Uniform,
-    Scenario::Fast,
-    Scenario::Clustered,
-    Scenario::Slab,
-    Scenario::Mixed,
-    Scenario::Resting,
-    Scenario::Gravity,
-    Scenario::Fragmentation,
-];
+/// Not measured unless they are named.
+const LEFT_OUT: [Scenario; 2] = [Scenario::Brownian, Scenario::FreeFall];
 
 const SIZES: [usize; 9] = [100, 300, 1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000];
 
@@ -30,6 +21,10 @@ pub(crate) struct Settings {
     pub(crate) threads: Vec<u32>,
     /// Time for the timed frames of a scenario at a size.
     pub(crate) time: Duration,
+    /// Time for the slowest frames of a scenario at a size. Zero leaves them out.
+    pub(crate) tail_time: Duration,
+    /// Names of those who take part, without what follows `@` or ` (`; all where it is empty.
+    pub(crate) contestants: Vec<String>,
     /// The folder that the results go into.
     pub(crate) results: Option<PathBuf>,
 }
@@ -39,16 +34,17 @@ impl Settings {
     /// Names the variable that can't be read.
     pub(crate) fn from_environment() -> Result<Self, String> {
         let full = std::env::args().any(|argument| argument == "--bench");
-        let seconds: f64 = list("SAPWISE_BENCH_SECONDS")?.map_or(6.0, |all: Vec<f64>| all[0]);
         let mut sizes = list("SAPWISE_SIZES")?.unwrap_or_else(|| SIZES[..if full { SIZES.len() } else { 1 }].to_vec());
         sizes.sort_unstable();
         Ok(Self {
             full,
             scenarios: list("SAPWISE_SCENARIOS")?
-                .unwrap_or_else(|| SCENARIOS.into_iter().chain(Scenario::HARD).collect()),
+                .unwrap_or_else(|| Scenario::ALL.into_iter().filter(|s| !LEFT_OUT.contains(s)).collect()),
             sizes,
             threads: list("SAPWISE_THREADS")?.unwrap_or_else(|| vec![1, 2]),
-            time: Duration::try_from_secs_f64(seconds).map_err(|e| format!("SAPWISE_BENCH_SECONDS: {e}"))?,
+            time: seconds("SAPWISE_BENCH_SECONDS", 6.0)?,
+            tail_time: seconds("SAPWISE_TAIL_SECONDS", 30.0)?,
+            contestants: list("SAPWISE_CONTESTANTS")?.unwrap_or_default(),
             results: path("SAPWISE_RESULTS"),
         })
     }
@@ -59,6 +55,12 @@ fn list<T: FromStr<Err: Display>>(name: &str) -> Result<Option<Vec<T>>, String> 
     let Ok(text) = std::env::var(name) else { return Ok(None) };
     let values = text.split(',').map(|word| word.trim().parse().map_err(|e| format!("{name}={text}: {e}")));
     values.collect::<Result<_, _>>().map(Some)
+}
+
+/// The time in a variable, in seconds.
+fn seconds(name: &str, usual: f64) -> Result<Duration, String> {
+    let seconds = list(name)?.map_or(usual, |all: Vec<f64>| all[0]);
+    Duration::try_from_secs_f64(seconds).map_err(|e| format!("{name}={seconds}: {e}"))
 }
 
 /// The path in a variable, from the root of the workspace: cargo runs a benchmark in the folder of its package.

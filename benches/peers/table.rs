@@ -96,22 +96,33 @@ fn by_scenario(points: &[Point], cell: impl Fn(&Point) -> Option<String>) -> Str
     grid("scenario", &sizes, &scenarios.into_iter().map(row).collect::<Vec<_>>())
 }
 
-/// All times of all points in milliseconds: one row for each contestant.
+/// All times of all points in milliseconds: one row for each contestant. Without slowest frames the last columns are
+/// empty.
 pub(crate) fn csv(results: &[(u32, Vec<Point>)]) -> String {
-    let mut text = "threads,scenario,objects,contestant,median_ms,quartile_1_ms,quartile_3_ms,frames\n".to_owned();
+    let mut text = "threads,scenario,objects,contestant,median_ms,quartile_1_ms,quartile_3_ms,frames,\
+        tail_p50_ms,tail_p99_ms,tail_worst_ms,tail_frames,tail_runs\n"
+        .to_owned();
     for (threads, points) in results {
         for point in points {
             for lane in &point.lanes {
                 let [low, median, high] = lane.quartiles().map(|s| digits(s * 1e3));
                 let (scenario, objects, name, frames) = (point.scenario, point.objects, &lane.name, lane.seconds.len());
-                let _ = writeln!(text, "{threads},{scenario},{objects},{name},{median},{low},{high},{frames}");
+                let _ = write!(text, "{threads},{scenario},{objects},{name},{median},{low},{high},{frames},");
+                let _ = match &lane.tail {
+                    Some(tail) => {
+                        let [p50, p99, worst] = tail.quantiles().map(|s| digits(s * 1e3));
+                        writeln!(text, "{p50},{p99},{worst},{},{}", tail.seconds.len(), tail.runs)
+                    }
+                    None => writeln!(text, ",,,,"),
+                };
             }
         }
     }
     text
 }
 
-/// The ratios to the fastest peer, by number of threads, under a line that says where and when they were measured.
+/// The ratios to the fastest peer and the slowest frames of `pair-cache`, by number of threads, under a line that says
+/// where and when they were measured.
 pub(crate) fn summary(results: &[(u32, Vec<Point>)]) -> String {
     let mut loads: Vec<f64> = results.iter().flat_map(|r| &r.1).filter_map(|p| p.foreign_load).collect();
     loads.sort_by(f64::total_cmp);
@@ -133,6 +144,14 @@ pub(crate) fn summary(results: &[(u32, Vec<Point>)]) -> String {
             goals(*threads),
             by_scenario(points, gain),
         );
+        let id = format!("pair-cache@cpu{threads}");
+        let slowest = |p: &Point| {
+            let tail = p.lanes.iter().find(|lane| lane.name == id)?.tail.as_ref()?;
+            let [p50, p99, worst] = tail.quantiles();
+            Some(format!("{}, {}", digits(p99 / p50), digits(worst / p50)))
+        };
+        let table = by_scenario(points, slowest);
+        let _ = write!(text, "`{id}`: 99th percentile and slowest frame over its median.\n\n{table}");
     }
     text
 }
