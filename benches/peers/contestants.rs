@@ -3,7 +3,7 @@
 use crate::ground::{Ground, Grounded};
 use crate::naive::Naive;
 use crate::obvhs_tree::{Moving, Obvhs};
-use crate::parry::{Margin, ParallelParry, Parry, Upkeep};
+use crate::parry::{Leaving, Margin, ParallelParry, Parry, Upkeep};
 use crate::rtree::{Packed, Rtree};
 use obvhs::bvh2::Bvh2;
 use parry3d::partitioning::Bvh;
@@ -113,7 +113,8 @@ pub(crate) fn peers(pool: Option<&Arc<ThreadPool>>, scenario: Scenario) -> Vec<C
     let mut peers = vec![
         Contestant::grounded::<Bvh>("parry3d refit", true, all, Parry::new(Upkeep::Refit)),
         Contestant::grounded::<Bvh>("parry3d optimise", true, all, Parry::new(Upkeep::Optimise)),
-        Contestant::grounded::<Bvh>("parry3d margin", true, all, Margin::new()),
+        Contestant::grounded::<Bvh>("parry3d margin", true, all, Margin::new(Leaving::Stays)),
+        Contestant::grounded::<Bvh>("parry3d reinsert", true, all, Margin::new(Leaving::Reinserted)),
     ];
     match pool {
         None => peers.extend([

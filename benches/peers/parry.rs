@@ -135,29 +135,69 @@ impl BroadPhase for ParallelParry {
 /// is slower or as fast.
 const MARGIN: f32 = 0.2;
 
-/// The margin about a box: no wider for a sheet or a rod, whose leaf would touch many others.
+/// The margin about a box: no wider for a sheet or a rod, whose leaf would touch many others. Above zero, where
+/// parry3d detects no change.
 pub(crate) fn margin(b: &Aabb) -> f32 {
-    (0..3).map(|a| b.max[a] - b.min[a]).fold(f32::INFINITY, f32::min) * MARGIN
+    let edge = (0..3).map(|a| b.max[a] - b.min[a]).fold(f32::INFINITY, f32::min);
+    (edge * MARGIN).max(f32::MIN_POSITIVE)
 }
 
 /// Frames from one step of `optimize_incremental` to the next: parry's documentation asks for 5 to 10; in each frame
 /// is slower in `uniform` and `resting`.
 const OPTIMISE_EVERY: u32 = 5;
 
+/// The most boxes, one in so many, that may leave their leaves for a partial refit: it walks up from each.
+const PARTIAL: usize = 8;
+
+/// What is done with a leaf that its box has left.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Leaving {
+    /// It grows where it is, and the tree is optimised now and then.
+    Stays,
+    /// It is removed and inserted again, and only the paths from such leaves are refitted if they are few.
+    Reinserted,
+}
+
 /// The scheme of rapier's broad phase: leaves with a margin, a traversal only where a box left its leaf, and a list
 /// of near pairs that is kept from frame to frame; those of them that overlap are the pairs.
 pub(crate) struct Margin {
+    leaving: Leaving,
     tree: Bvh,
     workspace: BvhWorkspace,
     changed: Vec<bool>,
+    /// The leaves that changed in this frame and in the one before it.
+    changes: [Vec<u32>; 2],
     near: Vec<(u32, u32)>,
     frame: u32,
 }
 
 impl Margin {
-    pub(crate) fn new() -> Self {
-        let (tree, workspace) = (Bvh::new(), BvhWorkspace::default());
-        Self { tree, workspace, changed: Vec::new(), near: Vec::new(), frame: 0 }
+    pub(crate) fn new(leaving: Leaving) -> Self {
+        let (tree, workspace, changes) = (Bvh::new(), BvhWorkspace::default(), [Vec::new(), Vec::new()]);
+        Self { leaving, tree, workspace, changed: Vec::new(), changes, near: Vec::new(), frame: 0 }
+    }
+
+    /// Puts every box into a leaf that holds it, and notes which leaves changed.
+    fn update(&mut self, boxes: &[Aabb]) {
+        let [now, before] = &mut self.changes;
+        std::mem::swap(now, before);
+        now.clear();
+        for ((k, b), changed) in (0..).zip(boxes).zip(&mut self.changed) {
+            let status = match self.leaving {
+                Leaving::Stays => self.tree.insert_or_update_partially(bounds(b), k, margin(b)),
+                Leaving::Reinserted => self.tree.reinsert_or_update_with_change_detection(bounds(b), k, margin(b)),
+            };
+            *changed = status != BvhLeafUpdateStatus::Unchanged;
+            now.extend(changed.then_some(k));
+        }
+        self.frame = self.frame.wrapping_add(1);
+        if self.leaving == Leaving::Reinserted && now.len().max(before.len()) < boxes.len() / PARTIAL {
+            return self.tree.refit_partial(before, now);
+        }
+        if self.leaving == Leaving::Stays && self.frame.is_multiple_of(OPTIMISE_EVERY) {
+            self.tree.optimize_incremental(&mut self.workspace);
+        }
+        self.tree.refit(&mut self.workspace);
     }
 }
 
@@ -168,18 +208,12 @@ impl BroadPhase for Margin {
             let leaves = boxes.iter().map(|b| bounds(b).loosened(margin(b))).enumerate();
             self.tree = Bvh::from_iter(BvhBuildStrategy::Binned, leaves);
             self.changed.resize(boxes.len(), true);
+            // All leaves count as changed, so that the next refit is a full one.
+            self.changes[0] = (0..boxes.len() as u32).collect();
             self.near.clear();
             self.tree.traverse_bvtt_single_tree::<false>(&mut self.workspace, &mut |a, b| self.near.push((a, b)));
         } else {
-            for ((k, b), changed) in (0..).zip(boxes).zip(&mut self.changed) {
-                let status = self.tree.insert_or_update_partially(bounds(b), k, margin(b));
-                *changed = status != BvhLeafUpdateStatus::Unchanged;
-            }
-            self.frame = self.frame.wrapping_add(1);
-            if self.frame.is_multiple_of(OPTIMISE_EVERY) {
-                self.tree.optimize_incremental(&mut self.workspace);
-            }
-            self.tree.refit(&mut self.workspace);
+            self.update(boxes);
             let changed = &self.changed;
             self.near.retain(|&(a, b)| !changed[a as usize] && !changed[b as usize]);
             self.tree.traverse_bvtt_single_tree::<true>(&mut self.workspace, &mut |a, b| self.near.push((a, b)));
