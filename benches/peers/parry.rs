@@ -131,8 +131,8 @@ impl BroadPhase for ParallelParry {
     }
 }
 
-/// Leaves larger than their boxes by this share of the box's shortest edge on each side. In `uniform` and `resting` half of it
-/// is slower or as fast.
+/// Leaves larger than their boxes by this share of the box's shortest edge on each side. In `uniform` and `resting`
+/// half of it is slower or as fast.
 const MARGIN: f32 = 0.2;
 
 /// The margin about a box: no wider for a sheet or a rod, whose leaf would touch many others. Above zero, where

@@ -1,7 +1,7 @@
 //! Objects that walk about their homes: the hard scenes with few pairs.
 //!
-//! `parked`, `stations`, `layers`, `plates`, `rods`, `static-world`, `asleep`, `tower`, `aliased`, `teleport`, `sheets`,
-//! `long-rods`, `beams`, `city`.
+//! `parked`, `stations`, `layers`, `plates`, `rods`, `static-world`, `asleep`, `tower`, `aliased`, `teleport`,
+//! `sheets`, `long-rods`, `beams`, `city`.
 
 use super::rng::{Powers, Rng, cube_root};
 use super::walk::reflect;
