@@ -4,7 +4,7 @@
 use crate::data::Profile;
 use crate::fit::designs::TrainingSet;
 use crate::fit::late_helpers::{self, Called};
-use crate::fit::load_residual::{Remainder, residual};
+use crate::fit::load_residual::{Basis, Groups, Remainder};
 use crate::fit::min_of_two::MinOfTwo;
 use crate::fit::robust::Problem;
 use crate::fit::rows::Row;
@@ -42,6 +42,8 @@ pub(super) struct Design {
     values: Array2<f64>,
     /// The rows on several threads, with what their machines make of these.
     called: Vec<(Row, ThreadFigures)>,
+    /// The groups of both for residuals.
+    groups: [Groups; 2],
     /// The method was never timed on one thread, so that its time on several counts as its work.
     never_alone: bool,
 }
@@ -53,10 +55,12 @@ impl Design {
         class: BackendClass,
         components: Vec<Component>,
         [alone, called]: [Vec<Row>; 2],
-        profiles: &[Profile],
+        (profiles, machines): (&[Profile], &[usize]),
+        basis: &Basis,
         notes: &mut Vec<String>,
     ) -> Self {
         let (mut kept, mut values) = (Vec::new(), Vec::new());
+        let mut of_groups = [Vec::new(), Vec::new()];
         let mut note = |row: &Row, why: PredictError| {
             let (profile, id) = (&profiles[row.profile], profiles[row.profile].id(row.algorithm).to_string());
             // Of several GPUs one may lack a parameter.
@@ -70,9 +74,15 @@ impl Design {
         let (alone, called) = if never_alone { (called, Vec::new()) } else { (alone, called) };
         for row in alone {
             let profile = &profiles[row.profile];
-            match nanoseconds(&components, &profile.hardware, profile.id(row.algorithm), &row) {
-                Ok(ns) => {
+            let at = || match class {
+                BackendClass::Cpu => GroupResidual::of_one_thread(&profile.hardware),
+                BackendClass::Gpu => Ok(Vec::new()),
+            };
+            let ns = nanoseconds(&components, &profile.hardware, profile.id(row.algorithm), &row);
+            match ns.and_then(|ns| Ok((ns, at()?))) {
+                Ok((ns, at)) => {
                     values.extend(ns);
+                    of_groups[0].push((row.load, at, machines[row.profile]));
                     kept.push(row);
                 }
                 Err(why) => note(&row, why),
@@ -81,13 +91,19 @@ impl Design {
         let mut with_figures = Vec::new();
         for row in called.into_iter().filter(|r| !r.floor) {
             let profile = &profiles[row.profile];
-            match ThreadFigures::of(&profile.hardware, profile.id(row.algorithm).threads()) {
-                Ok(figures) => with_figures.push((row, figures)),
+            let threads = profile.id(row.algorithm).threads();
+            let at = || GroupResidual::of_threads(&profile.hardware, threads);
+            match ThreadFigures::of(&profile.hardware, threads).and_then(|figures| Ok((figures, at()?))) {
+                Ok((figures, at)) => {
+                    of_groups[1].push((row.load, at, machines[row.profile]));
+                    with_figures.push((row, figures));
+                }
                 Err(why) => note(&row, why),
             }
         }
         let values = Array2::from_shape_vec((kept.len(), components.len()), values).unwrap_or_default();
-        Self { method, class, components, rows: kept, values, called: with_figures, never_alone }
+        let groups = of_groups.map(|rows| Groups::new(&rows, basis, is_incremental(&method)));
+        Self { method, class, components, rows: kept, values, called: with_figures, groups, never_alone }
     }
 
     pub(super) fn name(&self) -> String {
@@ -133,7 +149,7 @@ impl Design {
         profiles: &[Profile],
         machines: &[usize],
         other: Option<&MethodModel>,
-        places: &Arc<Places>,
+        basis: &Basis,
     ) -> Result<Option<MethodModel>> {
         let measured: Vec<usize> = (0..rows.len()).filter(|&k| !self.rows[rows[k]].floor).collect();
         let Some(first) = measured.first().filter(|_| measured.len() >= FEWEST_POINTS) else { return Ok(None) };
@@ -145,7 +161,7 @@ impl Design {
             weights: weights(&all, machines),
             floors: all.iter().map(|r| r.floor).collect(),
         };
-        let other_ns = other.map(|other| self.other_ns(&all, other, profiles, places)).transpose()?;
+        let other_ns = other.map(|other| self.other_ns(&all, other, profiles, &basis.places)).transpose()?;
         let min_of_two = other_ns.as_ref().map(|other_ns| MinOfTwo::fit(&problem, other_ns));
         let units = Array1::from(min_of_two.as_ref().map_or_else(|| problem.units(), |found| found.units.clone()));
         let modelled = match min_of_two.as_ref().zip(other_ns.as_ref()) {
@@ -155,31 +171,20 @@ impl Design {
         if measured.iter().any(|&k| modelled[k] <= 0.0) {
             return Ok(None);
         }
-        let remainder = |&k: &usize| -> Result<Remainder> {
-            let at = match self.class {
-                BackendClass::Cpu => GroupResidual::of_one_thread(&profiles[row(k).profile].hardware)?,
-                BackendClass::Gpu => Vec::new(),
-            };
-            Ok(row(k).remainder(modelled[k], at, machines))
-        };
-        let remainders: Vec<Remainder> = measured.iter().map(remainder).collect::<Result<_>>()?;
-        let by_motion = is_incremental(&self.method);
         let mut gpu_kinds: Vec<GpuKind> = rows.iter().flat_map(|&k| self.gpu_kinds(k, profiles)).collect();
         gpu_kinds.sort_unstable();
         gpu_kinds.dedup();
         // The error on a software adapter is that of its CPU, twice as large on one machine as on another: no
         // function of the load.
-        let residual = match gpu_kinds[..] {
-            [GpuKind::Software] => Vec::new(),
-            _ => residual(places, &remainders, by_motion)?,
+        let ln = |k: usize| (row(k).ns / modelled[k]).ln();
+        let (residual, left) = match gpu_kinds[..] {
+            [GpuKind::Software] => (Vec::new(), measured.iter().map(|&k| ln(k)).collect()),
+            _ => {
+                let remainder = |&k: &usize| Remainder { row: rows[k], ln: ln(k), behind: row(k).behind };
+                self.groups[0].residual(basis, &measured.iter().map(remainder).collect::<Vec<_>>())?
+            }
         };
-        let mut weights: BTreeMap<Vec<u64>, Vec<f64>> = BTreeMap::new();
-        let mut left = |r: &Remainder| {
-            let at = r.at.iter().map(|x| x.to_bits()).collect();
-            let weights = weights.entry(at).or_insert_with(|| GroupResidual::weights_at(&residual, &r.at));
-            r.ln - places.likeness(&r.load, by_motion).iter().zip(weights).map(|(k, w)| k * *w).sum::<f64>()
-        };
-        let spread_ln = robust_deviation(&remainders.iter().map(&mut left).collect::<Vec<f64>>()).unwrap_or(0.0);
+        let spread_ln = robust_deviation(&left).unwrap_or(0.0);
         let used = self.components.iter().zip(&units).filter(|(_, u)| **u > 0.0);
         let width = |&k: &usize| self.id(rows[k], profiles).backend().width();
         let revision = profiles[row(*first).profile].algorithms[usize::from(row(*first).algorithm)].revision;
@@ -193,7 +198,7 @@ impl Design {
             .collect();
         model.fallback =
             min_of_two.zip(other).map(|(found, o)| FallbackModel { method: o.method.clone(), factor: found.factor });
-        (model.residual, model.residual_by_motion, model.spread_ln) = (residual, by_motion, spread_ln);
+        (model.residual, model.residual_by_motion, model.spread_ln) = (residual, is_incremental(&self.method), spread_ln);
         Ok(Some(model))
     }
 
@@ -209,14 +214,15 @@ impl Design {
         training: TrainingSet<'_>,
         profiles: &[Profile],
         machines: &[usize],
-        places: &Arc<Places>,
+        basis: &Basis,
     ) -> Result<()> {
         if self.never_alone {
             model.helpers = (self.class == BackendClass::Cpu).then_some(HelpersModel::new(0.0, 0.0, 1.0, 0));
             return Ok(());
         }
-        let held = self.called.iter().filter(|(row, _)| training.holds(row, profiles));
-        let (all, figures): (Vec<&Row>, Vec<ThreadFigures>) = held.map(|(row, figures)| (row, *figures)).unzip();
+        let held: Vec<usize> =
+            (0..self.called.len()).filter(|&k| training.holds(&self.called[k].0, profiles)).collect();
+        let all: Vec<&Row> = held.iter().map(|&k| &self.called[k].0).collect();
         let weights = weights(&all, machines);
         let mut works: BTreeMap<usize, Work> = BTreeMap::new();
         let mut called = Vec::new();
@@ -226,12 +232,12 @@ impl Design {
                 let one = &Backend::Cpu(1);
                 let fallback = match (&model.fallback, other) {
                     (Some(f), Some(other)) => {
-                        let work = Arc::new(other.work(&profile.hardware, one, places, None)?);
+                        let work = Arc::new(other.work(&profile.hardware, one, &basis.places, None)?);
                         Some(Fallback { work, factor: f.factor })
                     }
                     _ => None,
                 };
-                place.insert(model.work(&profile.hardware, one, places, fallback)?);
+                place.insert(model.work(&profile.hardware, one, &basis.places, fallback)?);
             }
             let threads = profile.id(row.algorithm).threads();
             model.max_threads = model.max_threads.max(threads);
@@ -241,18 +247,18 @@ impl Design {
                 work_ns: self.alone_ns(row, profile).unwrap_or_else(|| works[&row.profile].ns(&row.load)),
                 ns: row.ns,
                 weight: weights[k],
-                figures: figures[k],
+                figures: self.called[held[k]].1,
             });
         }
         let step = called.len().div_ceil(MOST_CALLED).max(1);
         model.helpers = late_helpers::fit(&called.iter().step_by(step).copied().collect::<Vec<_>>());
         let Some(helpers) = model.helpers else { return Ok(()) };
-        let remainder = |(row, c): (&&Row, &Called)| -> Result<Remainder> {
-            let at = GroupResidual::of_threads(&profiles[row.profile].hardware, c.threads)?;
-            Ok(row.remainder(helpers.with(c.figures, c.threads).cost_ns(c.objects, c.work_ns), at, machines))
+        let remainder = |(k, c): (usize, &Called)| {
+            let modelled_ns = helpers.with(c.figures, c.threads).cost_ns(c.objects, c.work_ns);
+            Remainder { row: held[k], ln: (c.ns / modelled_ns).ln(), behind: all[k].behind }
         };
-        let remainders: Vec<Remainder> = all.iter().zip(&called).map(remainder).collect::<Result<_>>()?;
-        model.thread_residual = residual(places, &remainders, model.residual_by_motion)?;
+        let remainders: Vec<Remainder> = called.iter().enumerate().map(remainder).collect();
+        model.thread_residual = self.groups[1].residual(basis, &remainders)?.0;
         Ok(())
     }
 

@@ -2,7 +2,7 @@
 
 use crate::data::Profile;
 use crate::fit::design::{Design, FEWEST_POINTS};
-use crate::fit::load_residual;
+use crate::fit::load_residual::{Basis, places};
 use crate::fit::method_rows::rows_by_method;
 use crate::fit::rows::Row;
 use crate::fit::terms::{Component, components, fallback_method};
@@ -20,6 +20,7 @@ pub struct Designs<'a> {
     /// Position of the physical machine of each profile, counted in the order of their first profiles.
     pub(super) machines: Vec<usize>,
     pub(super) methods: Vec<Design>,
+    basis: Basis,
     /// What was left out because a parameter is missing.
     pub notes: Vec<String>,
 }
@@ -31,8 +32,6 @@ pub struct TrainingSet<'a> {
     pub profiles: &'a [bool],
     /// The scenario that is left out, if one is.
     pub without: Option<&'a str>,
-    /// The loads at which residuals are fitted; `None` for those that tell most about the loads of the profiles.
-    pub places: Option<&'a Arc<Places>>,
 }
 
 /// The fitted models of the methods.
@@ -40,8 +39,6 @@ pub struct TrainingSet<'a> {
 pub struct Fitted {
     /// One for each method on each class of processor.
     pub methods: Vec<MethodModel>,
-    /// The loads at which their residuals are fitted.
-    pub places: Arc<Places>,
     /// What was left out and why.
     pub notes: Vec<String>,
 }
@@ -49,7 +46,7 @@ pub struct Fitted {
 impl<'a> TrainingSet<'a> {
     /// These profiles with all of their scenarios.
     pub fn of(profiles: &'a [bool]) -> Self {
-        Self { profiles, without: None, places: None }
+        Self { profiles, without: None }
     }
 
     pub(super) fn holds(&self, row: &Row, all: &[Profile]) -> bool {
@@ -61,7 +58,12 @@ impl<'a> TrainingSet<'a> {
 impl<'a> Designs<'a> {
     /// Collects the rows of all methods, with the terms that reports name for a method, else with the usual ones.
     pub fn new(profiles: &'a [Profile]) -> Self {
-        let mut notes = Vec::new();
+        Self::at(profiles, Arc::new(places(profiles)))
+    }
+
+    /// Does the same for residuals at these places.
+    pub fn at(profiles: &'a [Profile], places: Arc<Places>) -> Self {
+        let (mut notes, machines, basis) = (Vec::new(), machines(profiles), Basis::new(places));
         let mut by_method: Vec<_> = rows_by_method(profiles).into_iter().collect();
         // A method that falls back to another one is fitted after that.
         by_method.sort_by_key(|((_, method), _)| fallback_method(method).is_some());
@@ -69,10 +71,15 @@ impl<'a> Designs<'a> {
             .into_iter()
             .map(|((class, method), rows)| {
                 let own = reported_terms(profiles, &method, class).unwrap_or_else(|| components(&method, class));
-                Design::new(method, class, own, rows, profiles, &mut notes)
+                Design::new(method, class, own, rows, (profiles, &machines), &basis, &mut notes)
             })
             .collect();
-        Self { profiles, machines: machines(profiles), methods, notes }
+        Self { profiles, machines, methods, basis, notes }
+    }
+
+    /// Returns the loads at which residuals are fitted.
+    pub fn places(&self) -> &Arc<Places> {
+        &self.basis.places
     }
 
     /// Fits a cost model for each method and class of processor that the training set holds enough timings of.
@@ -81,8 +88,6 @@ impl<'a> Designs<'a> {
     /// When a residual can't be solved for.
     pub fn fit(&self, training: TrainingSet<'_>) -> Result<Fitted> {
         let (mut models, mut notes): (Vec<MethodModel>, _) = (Vec::new(), Vec::new());
-        let chosen = self.profiles.iter().zip(training.profiles).filter(|(_, chosen)| **chosen).map(|(p, _)| p);
-        let places = training.places.map_or_else(|| load_residual::places(chosen, training.without), Arc::clone);
         for design in &self.methods {
             let other = fallback_method(&design.method)
                 .and_then(|other| models.iter().find(|m| m.method == other && m.backend == design.class))
@@ -93,10 +98,10 @@ impl<'a> Designs<'a> {
             if design.leave_out_software(&mut rows, self.profiles) && !notes.contains(&note) {
                 notes.push(note);
             }
-            match design.fit(&rows, self.profiles, &self.machines, other.as_ref(), &places)? {
+            match design.fit(&rows, self.profiles, &self.machines, other.as_ref(), &self.basis)? {
                 Some(mut model) => {
                     let (profiles, machines) = (self.profiles, &self.machines);
-                    design.call_helpers(&mut model, other.as_ref(), training, profiles, machines, &places)?;
+                    design.call_helpers(&mut model, other.as_ref(), training, profiles, machines, &self.basis)?;
                     models.push(model);
                 }
                 // None of the chosen profiles knows it.
@@ -107,7 +112,7 @@ impl<'a> Designs<'a> {
                 }
             }
         }
-        Ok(Fitted { methods: models, places, notes })
+        Ok(Fitted { methods: models, notes })
     }
 }
 

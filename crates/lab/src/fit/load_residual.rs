@@ -3,9 +3,8 @@
 
 use crate::data::Profile;
 use anyhow::{Context, Result};
-use linfa_linalg::cholesky::{Cholesky, InverseC};
-use linfa_linalg::triangular::{SolveTriangular, UPLO};
-use ndarray::{Array1, Array2, Axis, ShapeBuilder};
+use linfa_linalg::cholesky::Cholesky;
+use ndarray::{Array1, Array2, Axis, s};
 use sapwise::algorithm::Load;
 use sapwise::internals::Places;
 use sapwise::internals::stats::robust_deviation;
@@ -40,20 +39,6 @@ const LEAST_REACH_LN: f64 = 0.6;
 const MOST_STEPS: usize = 500;
 const SOLVED: f64 = 1e-4;
 
-/// One timing, for a residual.
-#[derive(Debug, Clone)]
-pub(crate) struct Remainder {
-    pub(crate) load: Load,
-    /// Natural logarithm of measured over modelled time.
-    pub(crate) ln: f64,
-    /// Time over the best of the point.
-    pub(crate) behind: f64,
-    /// Number of the physical machine.
-    pub(crate) machine: usize,
-    /// Position of the group, as in [`GroupResidual::at`].
-    pub(crate) at: Vec<f64>,
-}
-
 /// Returns the standard deviation of the logarithm of a timing around its residual, from its time over the best of
 /// the point.
 pub(crate) fn noise_ln(behind: f64) -> f64 {
@@ -63,10 +48,13 @@ pub(crate) fn noise_ln(behind: f64) -> f64 {
 /// Chooses the places that tell most about the loads of the profiles, each next one where the previous ones tell
 /// least: a pivoted Cholesky decomposition of the covariance (Fine and Scheinberg, Efficient SVM training using
 /// low-rank kernel representations, 2001).
-pub(crate) fn places<'a>(profiles: impl Iterator<Item = &'a Profile>, without: Option<&str>) -> Arc<Places> {
+///
+/// They are chosen once for all fits. Loads are the same on every machine, so that nothing of a held-out one leaks;
+/// of a held-out scenario the fit knows where its loads lie, and no time.
+pub(crate) fn places(profiles: &[Profile]) -> Places {
     // Profiles of one seed have the same scenes and loads.
     let mut loads: BTreeMap<(&str, u32), Load> = BTreeMap::new();
-    for spot in profiles.flat_map(|p| &p.points).filter(|s| Some(s.scenario.as_str()) != without) {
+    for spot in profiles.iter().flat_map(|p| &p.points) {
         loads.entry((&spot.scenario, spot.load.objects)).or_insert(spot.load);
     }
     let loads: Vec<Load> = loads.into_values().collect();
@@ -93,116 +81,181 @@ pub(crate) fn places<'a>(profiles: impl Iterator<Item = &'a Profile>, without: O
         columns.push(column);
         chosen.push(loads[next]);
     }
-    Arc::new(Places::new(chosen))
+    Places::new(chosen)
 }
 
-/// Returns the most likely residual of each position at which there are timings.
+/// Loads at which residuals are fitted, with what all fits at them share.
+#[derive(Debug)]
+pub(crate) struct Basis {
+    pub(crate) places: Arc<Places>,
+    /// Lower roots of the covariance of the places, whatever moves and by motion.
+    roots: [Array2<f64>; 2],
+}
+
+impl Basis {
+    pub(crate) fn new(places: Arc<Places>) -> Self {
+        let roots = [false, true].map(|by_motion| {
+            let mut root = Array2::zeros((places.loads().len(), places.loads().len()));
+            for (k, load) in places.loads().iter().enumerate() {
+                let before = before_each(&root, &places.likeness(load, by_motion)[..k]);
+                let own = 1.0 + JITTER - before.dot(&before);
+                root.slice_mut(s![k, ..k]).assign(&before);
+                root[[k, k]] = own.max(JITTER).sqrt();
+            }
+            root
+        });
+        Self { places, roots }
+    }
+
+    /// Returns what the residual under a load is a sum of, in coordinates in which its prior is a unit matrix.
+    fn features(&self, load: &Load, by_motion: bool) -> Array1<f64> {
+        before_each(&self.roots[usize::from(by_motion)], &self.places.likeness(load, by_motion))
+    }
+
+    /// Returns the weights of the places for weights of the features.
+    fn of_places(&self, mut weights: Vec<f64>, by_motion: bool) -> Vec<f64> {
+        let root = &self.roots[usize::from(by_motion)];
+        for k in (0..weights.len()).rev() {
+            let known: f64 = (k + 1..weights.len()).map(|j| root[[j, k]] * weights[j]).sum();
+            weights[k] = (weights[k] - known) / root[[k, k]];
+        }
+        weights.iter().map(|w| (w * PER_WEIGHT).round() / PER_WEIGHT).collect()
+    }
+}
+
+/// Solves `root x = right` for a lower triangle, as far as `right` goes.
+fn before_each(root: &Array2<f64>, right: &[f64]) -> Array1<f64> {
+    let mut x = Array1::zeros(right.len());
+    for (k, value) in right.iter().enumerate() {
+        let known = root.slice(s![k, ..k]).dot(&x.slice(s![..k]));
+        x[k] = (value - known) / root[[k, k]];
+    }
+    x
+}
+
+/// The rows of a method, each with the group of timings that it belongs to. Timings of one machine form a group if
+/// their positions are equal when rounded to a quarter.
+#[derive(Debug)]
+pub(super) struct Groups {
+    by_motion: bool,
+    /// Position, as in [`GroupResidual::at`], and number of the physical machine.
+    groups: Vec<(Vec<f64>, usize)>,
+    of_row: Vec<usize>,
+    /// Shape (rows, places).
+    features: Array2<f64>,
+}
+
+/// What a model leaves unexplained of one timing.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Remainder {
+    /// Position among the rows of the method.
+    pub(super) row: usize,
+    /// Natural logarithm of measured over modelled time.
+    pub(super) ln: f64,
+    /// Time over the best of the point.
+    pub(super) behind: f64,
+}
+
+impl Groups {
+    /// Sorts rows by position and machine, each with its load.
+    pub(super) fn new(rows: &[(Load, Vec<f64>, usize)], basis: &Basis, by_motion: bool) -> Self {
+        let mut groups: Vec<(Vec<f64>, usize)> = Vec::new();
+        let mut of_row = Vec::with_capacity(rows.len());
+        let mut features = Array2::zeros((rows.len(), basis.places.loads().len()));
+        for ((load, at, machine), mut features) in rows.iter().zip(features.rows_mut()) {
+            let group = (at.iter().map(|x| (x * PER_LENGTH).round() / PER_LENGTH).collect(), *machine);
+            of_row.push(groups.iter().position(|known| *known == group).unwrap_or(groups.len()));
+            if of_row.last() == Some(&groups.len()) {
+                groups.push(group);
+            }
+            features.assign(&basis.features(load, by_motion));
+        }
+        Self { by_motion, groups, of_row, features }
+    }
+
+    /// Returns the most likely residual of each position at which there are timings, and what it leaves of each.
+    ///
+    /// Minimises `sum (y - K w)^2 / noise^2` plus the prior of all groups together, by conjugate gradients.
+    ///
+    /// # Errors
+    /// When a system can't be solved.
+    pub(super) fn residual(
+        &self,
+        basis: &Basis,
+        remainders: &[Remainder],
+    ) -> Result<(Vec<GroupResidual>, Vec<f64>)> {
+        let spread = robust_deviation(&remainders.iter().map(|r| r.ln).collect::<Vec<f64>>()).unwrap_or(0.0);
+        let reach = (REACH * spread).max(LEAST_REACH_LN);
+        let mut members: BTreeMap<usize, Vec<&Remainder>> = BTreeMap::new();
+        remainders.iter().for_each(|r| members.entry(self.of_row[r.row]).or_default().push(r));
+        let (mut blocks, mut right) = (Vec::new(), Array2::zeros((members.len(), self.features.ncols())));
+        for (group, mut right) in members.values().zip(right.rows_mut()) {
+            let features = self.features.select(Axis(0), &group.iter().map(|r| r.row).collect::<Vec<_>>());
+            let precision = Array1::from_iter(group.iter().map(|r| noise_ln(r.behind).powi(-2)));
+            let weighted = &features * &precision.insert_axis(Axis(1));
+            right.assign(&weighted.t().dot(&Array1::from_iter(group.iter().map(|r| r.ln.clamp(-reach, reach)))));
+            blocks.push(weighted.t().dot(&features));
+        }
+        let groups: Vec<&(Vec<f64>, usize)> = members.keys().map(|k| &self.groups[*k]).collect();
+        // Of one machine alone, what is special about it can't be told from what all have.
+        let several = groups.iter().any(|g| g.1 != groups[0].1);
+        let covariance = Array2::from_shape_fn((groups.len(), groups.len()), |(a, b)| {
+            let of_machine = if several && groups[a].1 == groups[b].1 { MACHINE_LN.powi(2) } else { 0.0 };
+            let own = if a == b { GROUP_JITTER } else { 0.0 };
+            GroupResidual::covariance(&groups[a].0, &groups[b].0) + of_machine + own
+        });
+        let root = covariance.cholesky().context("the residual over the load can't be solved")?;
+        let weights = weights(&root, &blocks, &right);
+        // What was special about a machine is dropped: groups at one position count by their sum.
+        let mut residual: Vec<GroupResidual> = Vec::new();
+        for ((at, _), weights) in groups.into_iter().zip(weights.rows()) {
+            match residual.iter_mut().find(|known| known.at == *at) {
+                Some(known) => known.weights.iter_mut().zip(weights).for_each(|(sum, w)| *sum += w),
+                None => residual.push(GroupResidual { at: at.clone(), weights: weights.to_vec() }),
+            }
+        }
+        let of_groups: Vec<Array1<f64>> =
+            self.groups.iter().map(|(at, _)| Array1::from(GroupResidual::weights_at(&residual, at))).collect();
+        let left = |r: &Remainder| r.ln - self.features.row(r.row).dot(&of_groups[self.of_row[r.row]]);
+        let left = remainders.iter().map(left).collect();
+        residual.iter_mut().for_each(|g| g.weights = basis.of_places(std::mem::take(&mut g.weights), self.by_motion));
+        Ok((residual, left))
+    }
+}
+
+/// Returns the weights of all groups, one a row: `right - block u`, where the residual `u` of the groups solves
+/// `(covariance^-1 + block) u = right`.
 ///
-/// Timings of one machine form a group if their positions are equal when rounded to a quarter. Minimises
-/// `sum (y - K w)^2 / noise^2` plus the prior of all groups together, by conjugate gradients with the blocks of the
-/// groups as preconditioner.
-///
-/// # Errors
-/// When a system can't be solved.
-pub(crate) fn residual(places: &Places, remainders: &[Remainder], by_motion: bool) -> Result<Vec<GroupResidual>> {
-    let spread = robust_deviation(&remainders.iter().map(|r| r.ln).collect::<Vec<f64>>()).unwrap_or(0.0);
-    let reach = (REACH * spread).max(LEAST_REACH_LN);
-    let key = |r: &Remainder| (r.at.iter().map(|x| (x * PER_LENGTH).round() as i64).collect(), r.machine);
-    let mut groups: BTreeMap<(Vec<i64>, usize), Vec<&Remainder>> = BTreeMap::new();
-    remainders.iter().for_each(|r| groups.entry(key(r)).or_default().push(r));
-    let at: Vec<Vec<f64>> =
-        groups.keys().map(|(key, _)| key.iter().map(|k| *k as f64 / PER_LENGTH).collect()).collect();
-    let groups: Vec<Vec<&Remainder>> = groups.into_values().collect();
-    if groups.is_empty() {
-        return Ok(Vec::new());
-    }
-    let unsolved = "the residual over the load can't be solved";
-    let count = places.loads().len();
-    let mut between = Array2::zeros((count, count));
-    for (mut row, load) in between.rows_mut().into_iter().zip(places.loads()) {
-        row.assign(&Array1::from(places.likeness(load, by_motion)));
-    }
-    let root = (between + JITTER * Array2::<f64>::eye(count)).cholesky().context(unsolved)?;
-    let whiten = root.solve_triangular(&by_columns(count), UPLO::Lower).context(unsolved)?;
-    let mut blocks = Vec::new();
-    let mut right = Array2::zeros((groups.len(), count));
-    for (group, mut right) in groups.iter().zip(right.rows_mut()) {
-        let mut likeness = Array2::zeros((group.len(), count));
-        for (row, r) in likeness.rows_mut().into_iter().zip(group) {
-            row.into_iter().zip(places.likeness(&r.load, by_motion)).for_each(|(to, k)| *to = k);
-        }
-        let precision = Array1::from_iter(group.iter().map(|r| noise_ln(r.behind).powi(-2)));
-        let targets = Array1::from_iter(group.iter().map(|r| r.ln.clamp(-reach, reach)));
-        let weighted = &likeness * &precision.insert_axis(Axis(1));
-        // In coordinates in which the prior of a group is a unit matrix.
-        blocks.push(whiten.dot(&weighted.t().dot(&likeness)).dot(&whiten.t()));
-        right.assign(&whiten.dot(&weighted.t().dot(&targets)));
-    }
-    // Of one machine alone, what is special about it can't be told from what all have.
-    let several = groups.iter().any(|g| g[0].machine != groups[0][0].machine);
-    let covariance = Array2::from_shape_fn((groups.len(), groups.len()), |(a, b)| {
-        let [first, second] = [a, b].map(|k| groups[k][0].machine);
-        let of_machine = if several && first == second { MACHINE_LN.powi(2) } else { 0.0 };
-        let own = if a == b { GROUP_JITTER } else { 0.0 };
-        GroupResidual::covariance(&at[a], &at[b]) + of_machine + own
-    });
-    let inverse = covariance.invc().context(unsolved)?;
-    let solved = inverse.dot(&solved(&inverse, &blocks, &right).context(unsolved)?);
-    let weights = solved.dot(&whiten).mapv(|w| (w * PER_WEIGHT).round() / PER_WEIGHT);
-    // What was special about a machine is dropped: groups at one position count by their sum.
-    let mut residual: Vec<GroupResidual> = Vec::new();
-    for (at, weights) in at.into_iter().zip(weights.rows()) {
-        match residual.iter_mut().find(|known| known.at == at) {
-            Some(known) => known.weights.iter_mut().zip(weights).for_each(|(sum, w)| *sum += w),
-            None => residual.push(GroupResidual { at, weights: weights.to_vec() }),
-        }
-    }
-    Ok(residual)
-}
-
-/// Returns a unit matrix that lies in memory column by column, in which the triangular solver walks through it.
-fn by_columns(count: usize) -> Array2<f64> {
-    let mut unit = Array2::zeros((count, count).f());
-    unit.diag_mut().fill(1.0);
-    unit
-}
-
-/// Solves `inverse u + block_g u_g = right` for all groups together, one group a row.
-fn solved(inverse: &Array2<f64>, blocks: &[Array2<f64>], right: &Array2<f64>) -> linfa_linalg::Result<Array2<f64>> {
-    let mut of_blocks = Vec::new();
-    for (k, block) in blocks.iter().enumerate() {
-        let root = (block + inverse[[k, k]] * Array2::<f64>::eye(block.nrows())).cholesky()?;
-        let half = root.solve_triangular(&by_columns(block.nrows()), UPLO::Lower)?;
-        of_blocks.push(half.t().dot(&half));
-    }
-    let by_group = |matrices: &[Array2<f64>], x: &Array2<f64>| {
-        let mut out = Array2::zeros(x.raw_dim());
-        for ((mut out, x), m) in out.rows_mut().into_iter().zip(x.rows()).zip(matrices) {
-            out.assign(&m.dot(&x));
-        }
-        out
+/// Solves for `z` with `u = root z`, which has a unit matrix as its prior and needs no inverse of a covariance of
+/// which machines and positions make most groups the sum of others.
+fn weights(root: &Array2<f64>, blocks: &[Array2<f64>], right: &Array2<f64>) -> Array2<f64> {
+    let of_blocks = |z: &Array2<f64>| {
+        let mut u = root.dot(z);
+        u.rows_mut().into_iter().zip(blocks).for_each(|(mut u, block)| u.assign(&block.dot(&u)));
+        u
     };
     let dot = |a: &Array2<f64>, b: &Array2<f64>| (a * b).sum();
-    let mut x = Array2::zeros(right.raw_dim());
-    let mut left = right.clone();
-    let mut ahead = by_group(&of_blocks, &left);
-    let mut step = ahead.clone();
-    let mut gain = dot(&left, &ahead);
-    let enough = SOLVED * dot(right, right).sqrt();
+    let mut z = Array2::zeros(right.raw_dim());
+    let mut left = root.t().dot(right);
+    let mut step = left.clone();
+    let mut length = dot(&left, &left);
+    let enough = SOLVED.powi(2) * length;
+    let mut steps=0;
     for _ in 0..MOST_STEPS {
-        if dot(&left, &left).sqrt() <= enough {
+        if length <= enough {
             break;
         }
-        let image = inverse.dot(&step) + by_group(blocks, &step);
-        let length = gain / dot(&step, &image);
-        x.scaled_add(length, &step);
-        left.scaled_add(-length, &image);
-        ahead = by_group(&of_blocks, &left);
-        let next = dot(&left, &ahead);
-        step = &ahead + &(next / gain * step);
-        gain = next;
+        steps+=1;
+        let image = &step + &root.t().dot(&of_blocks(&step));
+        let share = length / dot(&step, &image);
+        z.scaled_add(share, &step);
+        left.scaled_add(-share, &image);
+        let next = dot(&left, &left);
+        step = &left + &(next / length * step);
+        length = next;
     }
-    Ok(x)
+    if std::env::var_os("CGS").is_some() { eprintln!("cg {} groups {steps} steps", blocks.len()); }
+    right - &of_blocks(&z)
 }
 
 #[cfg(test)]

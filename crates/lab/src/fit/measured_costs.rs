@@ -13,6 +13,7 @@ use sapwise::tuning::AlgorithmCost;
 use sapwise_scenes::Random;
 use sapwise_tune::hardware::{GpuParameterId, ParameterId, Quantity};
 use sapwise_tune::{Hardware, Model, Parameter};
+use std::sync::Arc;
 
 /// Points that a cost needs.
 pub(super) const FEWEST_POINTS: usize = 3;
@@ -51,10 +52,9 @@ fn own_costs(profile: &Profile, some: &[Entry], base: Option<&Model>) -> Vec<Alg
     let mut own = profile.clone();
     own.hardware = completed(&own.hardware);
     let profiles = [own];
-    let designs = Designs::new(&profiles);
-    let training = TrainingSet { places: base.map(|b| &b.places), ..TrainingSet::of(&[true]) };
+    let designs = base.map_or_else(|| Designs::new(&profiles), |b| Designs::at(&profiles, Arc::clone(&b.places)));
     // The caller reports the algorithms that could not be fitted.
-    let Ok((model, _)) = model(&profiles, &designs, training, "own") else { return Vec::new() };
+    let Ok((model, _)) = model(&profiles, &designs, TrainingSet::of(&[true]), "own") else { return Vec::new() };
     model.predict(&profiles[0].hardware, some).map_or_else(|_| Vec::new(), |p| p.costs)
 }
 

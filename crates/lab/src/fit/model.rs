@@ -6,6 +6,7 @@ use anyhow::{Result, bail};
 use sapwise::algorithm::Backend;
 use sapwise_tune::model::{GPU_PREFIX, Range};
 use sapwise_tune::{GpuHardware, Model};
+use std::sync::Arc;
 
 /// Fits a model to the chosen profiles. Returns it with sentences on what was left out and why.
 ///
@@ -17,10 +18,10 @@ pub fn model(
     training: TrainingSet<'_>,
     name: &str,
 ) -> Result<(Model, Vec<String>)> {
-    let Fitted { methods, places, notes } = designs.fit(training)?;
+    let Fitted { methods, notes } = designs.fit(training)?;
     let profiles: Vec<&Profile> =
         profiles.iter().zip(training.profiles).filter(|(_, chosen)| **chosen).map(|(p, _)| p).collect();
-    let model = Model::new(name, methods, ranges(&profiles)).with_places(places);
+    let model = Model::new(name, methods, ranges(&profiles)).with_places(Arc::clone(designs.places()));
     if let Some(defect) = model.defect() {
         bail!("no model could be fitted: {}", [vec![defect.to_string()], notes].concat().join("; "));
     }

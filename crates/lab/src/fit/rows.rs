@@ -1,7 +1,6 @@
 //! From profiles to the rows of a regression.
 
 use crate::data::{Profile, Spot};
-use crate::fit::load_residual::Remainder;
 use sapwise::algorithm::{BackendClass, Load};
 use std::collections::BTreeMap;
 
@@ -22,15 +21,6 @@ pub struct Row {
     pub behind: f64,
     /// The time is a lower bound: the algorithm had left the sweep before this point.
     pub floor: bool,
-}
-
-impl Row {
-    /// Returns what a model leaves unexplained of this timing, as one of the group at `at`, with the number of the
-    /// physical machine of each profile.
-    pub(super) fn remainder(&self, modelled_ns: f64, at: Vec<f64>, machines: &[usize]) -> Remainder {
-        let (ln, machine) = ((self.ns / modelled_ns).ln(), machines[self.profile]);
-        Remainder { load: self.load, ln, behind: self.behind, machine, at }
-    }
 }
 
 /// An algorithm that left the sweep is assumed to be at least this many times slower than the best at larger sizes,

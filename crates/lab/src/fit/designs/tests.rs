@@ -19,8 +19,8 @@ fn fitted(profiles: &[Profile]) -> (Vec<MethodModel>, Vec<String>) {
 
 fn whole(profiles: &[Profile]) -> (Model, Vec<String>) {
     let designs = Designs::new(profiles);
-    let Fitted { methods, places, notes } = designs.fit(TrainingSet::of(&vec![true; profiles.len()])).unwrap();
-    (Model::new("test", methods, Vec::new()).with_places(places), [designs.notes.clone(), notes].concat())
+    let Fitted { methods, notes } = designs.fit(TrainingSet::of(&vec![true; profiles.len()])).unwrap();
+    (Model::new("test", methods, Vec::new()).with_places(Arc::clone(designs.places())), [designs.notes.clone(), notes].concat())
 }
 
 /// What a model predicts for the measured rows of a profile over what was measured.
