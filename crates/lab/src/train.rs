@@ -2,7 +2,7 @@
 
 use crate::data::{Profile, Selection};
 use crate::evaluate::{HeldOut, Partition, validate};
-use crate::fit::{Designs, TrainingSet, model};
+use crate::fit::{Designs, model};
 use crate::progress::Progress;
 use crate::report::Label;
 use crate::training::{Training, TrainingCount, TrainingReport};
@@ -41,7 +41,7 @@ pub fn without(profiles: &[Profile], file: &str) -> Result<(Model, String)> {
     if !chosen.contains(&true) {
         bail!("there is no other report to predict {file} from");
     }
-    let model = model(profiles, &Designs::new(profiles), TrainingSet::of(&chosen), "without")?.0;
+    let model = model(&Designs::new(profiles), &chosen, "without")?.0;
     Ok((model, partition.held_out))
 }
 
@@ -57,7 +57,7 @@ pub fn train(selection: Selection, name: &str, progress: &dyn Progress) -> Resul
         bail!("no report can be trained on: {why}; measure one with `sapwise probe --out R.json` of a release build");
     }
     let designs = Designs::new(&profiles);
-    let (model, left_out) = model(&profiles, &designs, TrainingSet::of(&vec![true; profiles.len()]), name)?;
+    let (model, left_out) = model(&designs, &vec![true; profiles.len()], name)?;
     notes.extend(designs.notes.iter().cloned());
     notes.extend(left_out);
     let validated = validate(&profiles, &designs, &Partition::new(&profiles), progress)?;

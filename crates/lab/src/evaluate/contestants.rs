@@ -6,28 +6,23 @@ use super::forest::{Forests, Table};
 use super::regret_table::{RegretTable, Strategy};
 use super::scores::{OURS, SINGLE_BEST};
 use crate::data::Profile;
-use crate::fit::{Designs, TrainingSet, measured_costs, model};
+use crate::fit::{Designs, costs_of_one, model};
 use anyhow::Result;
 use rayon::prelude::*;
 use sapwise::AlgorithmId;
 use sapwise::tuning::AlgorithmCost;
 use sapwise_tune::Model;
 use sapwise_tune::model::MethodModel;
-use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::OnceLock;
 
 const PHYSICS: &str = "physics";
 const FOREST: &str = "random forest";
 const NEAREST: &str = "nearest machine";
 const FULL_SWEEP: &str = "full sweep";
 
-/// The measured costs of profiles without one of their scenarios, when they are first needed.
-type Partial = BTreeMap<(usize, String), Arc<OnceLock<Vec<AlgorithmCost>>>>;
-
 /// What all folds share.
 pub(super) struct Material<'a> {
     pub(super) profiles: &'a [Profile],
-    designs: &'a Designs<'a>,
     table: Table,
     /// The regret table of each profile, when it is first needed.
     regrets: Vec<OnceLock<RegretTable>>,
@@ -35,14 +30,19 @@ pub(super) struct Material<'a> {
     outcomes: Vec<Vec<RoleOutcome>>,
     /// What machines are compared by, of each profile.
     likeness: Vec<Likeness>,
-    /// The measured costs of each profile, when they are first needed, and those without a scenario.
+}
+
+/// What folds share in which the same scenario is held out, or none.
+pub(super) struct Seen<'a> {
+    without: Option<&'a str>,
+    designs: &'a Designs<'a>,
+    /// The measured costs of each profile, when they are first needed.
     costs: Vec<OnceLock<Vec<AlgorithmCost>>>,
-    partial: Mutex<Partial>,
 }
 
 /// What was fitted to the training of a fold.
 pub(super) struct Fitted<'a> {
-    without: Option<&'a str>,
+    seen: &'a Seen<'a>,
     /// Positions of the profiles of the training, and what their machines are compared by.
     known: Vec<usize>,
     likeness: Vec<&'a Likeness>,
@@ -69,29 +69,25 @@ pub(super) struct Contestant<'a> {
 }
 
 impl<'a> Material<'a> {
-    pub(super) fn new(profiles: &'a [Profile], designs: &'a Designs<'a>) -> Self {
+    pub(super) fn new(profiles: &'a [Profile]) -> Self {
         Self {
             profiles,
-            designs,
             table: Table::new(profiles),
             regrets: profiles.iter().map(|_| OnceLock::new()).collect(),
             outcomes: profiles.par_iter().map(role_outcomes).collect(),
             likeness: profiles.iter().map(|p| Likeness::new(&p.hardware)).collect(),
-            costs: profiles.iter().map(|_| OnceLock::new()).collect(),
-            partial: Mutex::default(),
         }
     }
 
-    /// Fits everything to the profiles that are not in a fold, to all of their scenarios but one.
+    /// Fits everything to the profiles that are not in a fold.
     ///
     /// # Errors
     /// When a regression fails.
-    pub(super) fn fit(&'a self, fold: &[usize], without: Option<&'a str>) -> Result<Fitted<'a>> {
-        let mut notes = Vec::new();
+    pub(super) fn fit(&'a self, fold: &[usize], seen: &'a Seen<'a>) -> Result<Fitted<'a>> {
+        let (without, mut notes) = (seen.without, Vec::new());
         let mut chosen = vec![true; self.profiles.len()];
         fold.iter().for_each(|&k| chosen[k] = false);
-        let training = TrainingSet { without, ..TrainingSet::of(&chosen) };
-        let models = match model(self.profiles, self.designs, training, "validation") {
+        let models = match model(seen.designs, &chosen, "validation") {
             Ok((model, _)) => {
                 let mut physics = model.clone();
                 physics.methods = model.methods.iter().map(MethodModel::without_residual).collect();
@@ -108,7 +104,7 @@ impl<'a> Material<'a> {
         let left_out =
             |k: usize, spot: u32| without.is_some_and(|w| self.profiles[k].points[spot as usize].scenario == w);
         Ok(Fitted {
-            without,
+            seen,
             likeness: known.iter().map(|&k| &self.likeness[k]).collect(),
             always: known.iter().map(|&k| (&self.profiles[k], always(k))).collect(),
             models,
@@ -122,24 +118,17 @@ impl<'a> Material<'a> {
     pub(super) fn regret_table(&self, k: usize) -> &RegretTable {
         self.regrets[k].get_or_init(|| RegretTable::new(&self.profiles[k]))
     }
+}
+
+impl<'a> Seen<'a> {
+    pub(super) fn new(without: Option<&'a str>, designs: &'a Designs<'a>) -> Self {
+        let costs = designs.profiles().iter().map(|_| OnceLock::new()).collect();
+        Self { without, designs, costs }
+    }
 
     /// Returns the measured costs of a profile.
     pub(super) fn costs(&self, k: usize) -> &[AlgorithmCost] {
-        self.costs[k].get_or_init(|| measured_costs(&self.profiles[k]).0)
-    }
-
-    /// Returns the same without a scenario.
-    fn costs_without(&self, k: usize, scenario: &str) -> Vec<AlgorithmCost> {
-        let mut partial = self.partial.lock().unwrap_or_else(PoisonError::into_inner);
-        let place = Arc::clone(partial.entry((k, scenario.to_owned())).or_default());
-        // Not held while one profile is fitted: the other threads fit others.
-        drop(partial);
-        let fit = || {
-            let mut own = self.profiles[k].clone();
-            own.points.retain(|s| s.scenario != scenario);
-            measured_costs(&own).0
-        };
-        place.get_or_init(fit).clone()
+        self.costs[k].get_or_init(|| costs_of_one(self.designs, k))
     }
 }
 
@@ -173,7 +162,7 @@ impl Fitted<'_> {
         ]
     }
 
-    /// Returns all strategies for a held-out profile.
+    /// Returns the strategies for a held-out profile, fewer if a scenario is held out too.
     ///
     /// # Errors
     /// When a regression fails.
@@ -184,40 +173,22 @@ impl Fitted<'_> {
         ours: Option<&'b Ours>,
         available: &'b [AlgorithmId],
     ) -> Result<Vec<Contestant<'b>>> {
-        let profile = &data.profiles[held];
-        let nearest = baselines::nearest(&self.likeness, &data.likeness[held]).map(|k| data.costs(self.known[k]));
-        let crossed: Vec<(&Profile, &[RoleOutcome])> =
-            self.known.iter().map(|&k| (&data.profiles[k], &data.outcomes[k][..])).collect();
+        let (profile, seen) = (&data.profiles[held], self.seen);
+        let nearest = baselines::nearest(&self.likeness, &data.likeness[held]).map(|k| seen.costs(self.known[k]));
         let mut all = Vec::from(self.ours(profile, ours, available));
-        all.extend([
-            by(NEAREST, nearest, available),
-            alone("direct regression", direct(&crossed, &profile.hardware, available)?),
-            alone("frozen constants (64)", baselines::frozen(64, "grid-sap", available)),
-            alone("frozen constants (1000)", baselines::frozen(999, "sap", available)),
-            // Crossovers are measured by its costs.
-            Contestant { costs: None, ..by(FULL_SWEEP, Some(data.costs(held)), available) },
-        ]);
+        all.push(by(NEAREST, nearest, available));
+        if seen.without.is_none() {
+            let crossed: Vec<(&Profile, &[RoleOutcome])> =
+                self.known.iter().map(|&k| (&data.profiles[k], &data.outcomes[k][..])).collect();
+            all.extend([
+                alone("direct regression", direct(&crossed, &profile.hardware, available)?),
+                alone("frozen constants (64)", baselines::frozen(64, "grid-sap", available)),
+                alone("frozen constants (1000)", baselines::frozen(999, "sap", available)),
+            ]);
+        }
+        // Only the scenario is held out from it, not its own machine. Crossovers are measured by its costs.
+        all.push(Contestant { costs: None, ..by(FULL_SWEEP, Some(seen.costs(held)), available) });
         Ok(all)
-    }
-
-    /// Returns the strategies that are judged on unseen scenarios.
-    pub(super) fn judged_on_unseen<'b>(
-        &'b self,
-        data: &'b Material<'_>,
-        held: usize,
-        ours: Option<&'b Ours>,
-        available: &'b [AlgorithmId],
-    ) -> Vec<Contestant<'b>> {
-        let mut all = Vec::from(self.ours(&data.profiles[held], ours, available));
-        let measured = |k: Option<usize>| match k.zip(self.without) {
-            Some((k, without)) => by_costs(data.costs_without(k, without), available),
-            None => nothing(),
-        };
-        let nearest = baselines::nearest(&self.likeness, &data.likeness[held]).map(|k| self.known[k]);
-        all.push(alone(NEAREST, measured(nearest)));
-        // Only the scenario is held out from it, not its own machine.
-        all.push(alone(FULL_SWEEP, measured(Some(held))));
-        all
     }
 }
 

@@ -48,7 +48,7 @@ impl Table {
         let mut table: BTreeMap<Key, Vec<Example>> = BTreeMap::new();
         for (k, profile) in profiles.iter().enumerate().step_by(step) {
             let mut own: BTreeMap<Key, Vec<Row>> = BTreeMap::new();
-            for row in rows(profile, k) {
+            for row in rows(profile, k, None) {
                 own.entry(key(profile.id(row.algorithm))).or_default().push(row);
             }
             for (key, rows) in own {
@@ -103,9 +103,9 @@ struct Forest(RandomForestRegressor<f64, f64, DenseMatrix<f64>, Vec<f64>>);
 impl Forest {
     fn grow(examples: &[&Example]) -> Result<Self> {
         let columns = examples.first().map_or(0, |e| e.features.len());
-        let values = examples.iter().flat_map(|e| e.features.iter().copied()).collect();
-        let x =
-            DenseMatrix::new(examples.len(), columns, values, false).context("the rows of a random forest differ")?;
+        // Column by column, as a tree looks for a split.
+        let values = (0..columns).flat_map(|c| examples.iter().map(move |e| e.features[c])).collect();
+        let x = DenseMatrix::new(examples.len(), columns, values, true).context("the rows of a random forest differ")?;
         let y: Vec<f64> = examples.iter().map(|e| e.ln_ns).collect();
         let parameters = RandomForestRegressorParameters::default()
             .with_n_trees(TREES)

@@ -1,6 +1,6 @@
 //! How well each strategy does on machines that it was not trained on, in seen and in unseen scenarios.
 
-use super::contestants::{Contestant, Fitted, Material};
+use super::contestants::{Contestant, Fitted, Material, Seen};
 use super::coverage::{Errors, coverage};
 use super::crossovers::MeasuredCrossovers;
 use super::floor::floor;
@@ -63,7 +63,7 @@ pub fn validate(
             );
         }
         notes.push("the full sweep is judged by the timings that it was fitted to".to_owned());
-        let data = Material::new(profiles, designs);
+        let (data, seen) = (Material::new(profiles), Seen::new(None, designs));
         let most = MOST_JUDGED.div_ceil(partition.folds.len());
         // Evenly over a fold. Profiles of GPUs alone are left out: a program always has the CPU to choose as well.
         let judged = |fold: &Vec<usize>| -> Vec<usize> {
@@ -73,7 +73,7 @@ pub fn validate(
         };
         let fold = |fold: &Vec<usize>| {
             progress.check()?;
-            let found = held_out(&data, &data.fit(fold, None)?, &judged(fold))?;
+            let found = held_out(&data, &seen, &data.fit(fold, &seen)?, &judged(fold))?;
             progress.advance(1);
             Ok(found)
         };
@@ -88,7 +88,7 @@ pub fn validate(
         for judged in &mut all {
             judged.unseen = unseen.get(&(judged.file.clone(), judged.name)).cloned();
         }
-        chance = floor(profiles, |k| data.regret_table(k), |k| data.costs(k));
+        chance = floor(profiles, |k| data.regret_table(k), |k| seen.costs(k));
         covered = coverage(&errors).filter(|_| partition.by_machine);
     }
     let mut cpu_models: Vec<&str> = profiles.iter().map(Profile::cpu_model).collect();
@@ -126,7 +126,7 @@ struct Found {
 ///
 /// # Errors
 /// When a regression fails.
-fn held_out(data: &Material<'_>, fitted: &Fitted<'_>, judged: &[usize]) -> Result<Found> {
+fn held_out(data: &Material<'_>, seen: &Seen<'_>, fitted: &Fitted<'_>, judged: &[usize]) -> Result<Found> {
     let mut found = Found { notes: fitted.notes.clone(), ..Found::default() };
     for &held in judged {
         let profile = &data.profiles[held];
@@ -134,7 +134,7 @@ fn held_out(data: &Material<'_>, fitted: &Fitted<'_>, judged: &[usize]) -> Resul
         let available = profile.available();
         let contestants = fitted.contestants(data, held, ours.as_ref(), &available)?;
         let costs = ours.as_ref().map(|o| &o.whole[..]);
-        let measured = MeasuredCrossovers::of_scenarios(profile, data.costs(held));
+        let measured = MeasuredCrossovers::of_scenarios(profile, seen.costs(held));
         if let Some(costs) = costs {
             for own in &measured {
                 let (file, scenario) = (&profile.file, &own.scenario);
@@ -170,31 +170,37 @@ fn unseen(
     if scenarios.len() < 2 {
         return Ok(BTreeMap::new());
     }
-    let fits = partition.folds.iter().flat_map(|fold| scenarios.iter().map(move |s| (fold, *s)));
     let step = (partition.folds.len() * scenarios.len()).div_ceil(MOST_UNSEEN);
-    let fits: Vec<(&Vec<usize>, &str)> = fits.step_by(step).collect();
-    let one = |&(fold, scenario): &(&Vec<usize>, &str)| -> Result<Vec<((String, &'static str), Regret)>> {
-        progress.check()?;
-        let held: Vec<usize> =
-            judged(fold).into_iter().filter(|&k| data.profiles[k].scenarios().any(|s| s == scenario)).collect();
-        if held.is_empty() {
-            return Ok(Vec::new());
-        }
-        let fitted = data.fit(fold, Some(scenario))?;
-        let mut regrets = Vec::new();
-        for k in held {
-            let profile = &data.profiles[k];
-            let ours = fitted.predict(profile, &mut Vec::new());
-            let available = profile.available();
-            for c in fitted.judged_on_unseen(data, k, ours.as_ref(), &available) {
-                let regret = data.regret_table(k).regret_in(Some(scenario), profile, &c.choose);
-                regrets.push(((profile.file.clone(), c.name), regret));
+    let of_scenario = |(turn, scenario): (usize, &&str)| -> Result<Vec<((String, &'static str), Regret)>> {
+        let designs = Designs::without(data.profiles, Some(scenario));
+        let seen = Seen::new(Some(scenario), &designs);
+        let one = |fold: &Vec<usize>| -> Result<Vec<((String, &'static str), Regret)>> {
+            progress.check()?;
+            let has = |k: &usize| data.profiles[*k].scenarios().any(|s| s == *scenario);
+            let held: Vec<usize> = judged(fold).into_iter().filter(has).collect();
+            if held.is_empty() {
+                return Ok(Vec::new());
             }
-        }
-        Ok(regrets)
+            let fitted = data.fit(fold, &seen)?;
+            let mut regrets = Vec::new();
+            for k in held {
+                let profile = &data.profiles[k];
+                let ours = fitted.predict(profile, &mut Vec::new());
+                let available = profile.available();
+                for c in fitted.contestants(data, k, ours.as_ref(), &available)? {
+                    let regret = data.regret_table(k).regret_in(Some(scenario), profile, &c.choose);
+                    regrets.push(((profile.file.clone(), c.name), regret));
+                }
+            }
+            Ok(regrets)
+        };
+        let folds: Vec<&Vec<usize>> = partition.folds.iter().skip(turn % step).step_by(step).collect();
+        Ok(folds.into_par_iter().map(one).collect::<Result<Vec<_>>>()?.concat())
     };
+    let scenarios: Vec<&str> = scenarios.into_iter().collect();
     let mut all: BTreeMap<(String, &'static str), Regret> = BTreeMap::new();
-    for (key, regret) in fits.par_iter().map(one).collect::<Result<Vec<_>>>()?.into_iter().flatten() {
+    let found = scenarios.par_iter().enumerate().map(of_scenario).collect::<Result<Vec<_>>>()?;
+    for (key, regret) in found.into_iter().flatten() {
         let before = all.remove(&key).unwrap_or_default();
         all.insert(key, before.and(regret));
     }

@@ -2,7 +2,6 @@
 //! thread counts and GPUs share it.
 
 use crate::data::Profile;
-use crate::fit::designs::TrainingSet;
 use crate::fit::late_helpers::{self, Called};
 use crate::fit::load_residual::{Basis, Groups, Remainder};
 use crate::fit::min_of_two::MinOfTwo;
@@ -11,7 +10,7 @@ use crate::fit::rows::Row;
 use crate::fit::terms::{Component, is_incremental};
 use crate::fit::weights::weights;
 use anyhow::Result;
-use ndarray::{Array1, Array2, Axis};
+use ndarray::{Array1, Array2, ShapeBuilder};
 use sapwise::AlgorithmId;
 use sapwise::algorithm::{Backend, BackendClass};
 use sapwise::internals::stats::robust_deviation;
@@ -156,7 +155,7 @@ impl Design {
         let row = |k: usize| &self.rows[rows[k]];
         let all: Vec<&Row> = rows.iter().map(|&k| &self.rows[k]).collect();
         let problem = Problem {
-            terms: self.values.select(Axis(0), rows),
+            terms: Array2::from_shape_fn((rows.len(), self.components.len()).f(), |(k, j)| self.values[[rows[k], j]]),
             ns: all.iter().map(|r| r.ns).collect(),
             weights: weights(&all, machines),
             floors: all.iter().map(|r| r.floor).collect(),
@@ -211,7 +210,7 @@ impl Design {
         &self,
         model: &mut MethodModel,
         other: Option<&MethodModel>,
-        training: TrainingSet<'_>,
+        chosen: &[bool],
         profiles: &[Profile],
         machines: &[usize],
         basis: &Basis,
@@ -221,7 +220,7 @@ impl Design {
             return Ok(());
         }
         let held: Vec<usize> =
-            (0..self.called.len()).filter(|&k| training.holds(&self.called[k].0, profiles)).collect();
+            (0..self.called.len()).filter(|&k| chosen[self.called[k].0.profile]).collect();
         let all: Vec<&Row> = held.iter().map(|&k| &self.called[k].0).collect();
         let weights = weights(&all, machines);
         let mut works: BTreeMap<usize, Work> = BTreeMap::new();

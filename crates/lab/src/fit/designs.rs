@@ -4,7 +4,6 @@ use crate::data::Profile;
 use crate::fit::design::{Design, FEWEST_POINTS};
 use crate::fit::load_residual::{Basis, places};
 use crate::fit::method_rows::rows_by_method;
-use crate::fit::rows::Row;
 use crate::fit::terms::{Component, components, fallback_method};
 use anyhow::Result;
 use sapwise::algorithm::BackendClass;
@@ -16,22 +15,15 @@ use std::sync::Arc;
 /// The rows of every method with all that a fit needs, worked out once for all fits to parts of the profiles.
 #[derive(Debug)]
 pub struct Designs<'a> {
-    profiles: &'a [Profile],
+    pub(super) profiles: &'a [Profile],
+    /// The scenario that is left out, if one is.
+    pub(super) without: Option<&'a str>,
     /// Position of the physical machine of each profile, counted in the order of their first profiles.
     pub(super) machines: Vec<usize>,
     pub(super) methods: Vec<Design>,
     basis: Basis,
     /// What was left out because a parameter is missing.
     pub notes: Vec<String>,
-}
-
-/// The profiles and scenarios that a model is fitted to.
-#[derive(Debug, Clone, Copy)]
-pub struct TrainingSet<'a> {
-    /// Whether each profile is in it.
-    pub profiles: &'a [bool],
-    /// The scenario that is left out, if one is.
-    pub without: Option<&'a str>,
 }
 
 /// The fitted models of the methods.
@@ -43,28 +35,21 @@ pub struct Fitted {
     pub notes: Vec<String>,
 }
 
-impl<'a> TrainingSet<'a> {
-    /// These profiles with all of their scenarios.
-    pub fn of(profiles: &'a [bool]) -> Self {
-        Self { profiles, without: None }
-    }
-
-    pub(super) fn holds(&self, row: &Row, all: &[Profile]) -> bool {
-        let scenario = || &all[row.profile].points[row.spot as usize].scenario;
-        self.profiles[row.profile] && self.without.is_none_or(|without| scenario() != without)
-    }
-}
-
 impl<'a> Designs<'a> {
     /// Collects the rows of all methods, with the terms that reports name for a method, else with the usual ones.
     pub fn new(profiles: &'a [Profile]) -> Self {
-        Self::at(profiles, Arc::new(places(profiles)))
+        Self::without(profiles, None)
+    }
+
+    /// Does the same without a scenario.
+    pub fn without(profiles: &'a [Profile], scenario: Option<&'a str>) -> Self {
+        Self::at(profiles, scenario, Arc::new(places(profiles, scenario)))
     }
 
     /// Does the same for residuals at these places.
-    pub fn at(profiles: &'a [Profile], places: Arc<Places>) -> Self {
+    pub(super) fn at(profiles: &'a [Profile], without: Option<&'a str>, places: Arc<Places>) -> Self {
         let (mut notes, machines, basis) = (Vec::new(), machines(profiles), Basis::new(places));
-        let mut by_method: Vec<_> = rows_by_method(profiles).into_iter().collect();
+        let mut by_method: Vec<_> = rows_by_method(profiles, without).into_iter().collect();
         // A method that falls back to another one is fitted after that.
         by_method.sort_by_key(|((_, method), _)| fallback_method(method).is_some());
         let methods = by_method
@@ -74,7 +59,12 @@ impl<'a> Designs<'a> {
                 Design::new(method, class, own, rows, (profiles, &machines), &basis, &mut notes)
             })
             .collect();
-        Self { profiles, machines, methods, basis, notes }
+        Self { profiles, without, machines, methods, basis, notes }
+    }
+
+    /// Returns the profiles that the rows are of.
+    pub fn profiles(&self) -> &'a [Profile] {
+        self.profiles
     }
 
     /// Returns the loads at which residuals are fitted.
@@ -82,18 +72,18 @@ impl<'a> Designs<'a> {
         &self.basis.places
     }
 
-    /// Fits a cost model for each method and class of processor that the training set holds enough timings of.
+    /// Fits a cost model for each method and class of processor that the chosen profiles hold enough timings of.
     ///
     /// # Errors
     /// When a residual can't be solved for.
-    pub fn fit(&self, training: TrainingSet<'_>) -> Result<Fitted> {
+    pub fn fit(&self, chosen: &[bool]) -> Result<Fitted> {
         let (mut models, mut notes): (Vec<MethodModel>, _) = (Vec::new(), Vec::new());
         for design in &self.methods {
             let other = fallback_method(&design.method)
                 .and_then(|other| models.iter().find(|m| m.method == other && m.backend == design.class))
                 .cloned();
             let mut rows: Vec<usize> =
-                (0..design.rows.len()).filter(|&k| training.holds(&design.rows[k], self.profiles)).collect();
+                (0..design.rows.len()).filter(|&k| chosen[design.rows[k].profile]).collect();
             let note = "on GPUs, timings on software adapters are left out: there are timings on real GPUs".to_owned();
             if design.leave_out_software(&mut rows, self.profiles) && !notes.contains(&note) {
                 notes.push(note);
@@ -101,7 +91,7 @@ impl<'a> Designs<'a> {
             match design.fit(&rows, self.profiles, &self.machines, other.as_ref(), &self.basis)? {
                 Some(mut model) => {
                     let (profiles, machines) = (self.profiles, &self.machines);
-                    design.call_helpers(&mut model, other.as_ref(), training, profiles, machines, &self.basis)?;
+                    design.call_helpers(&mut model, other.as_ref(), chosen, profiles, machines, &self.basis)?;
                     models.push(model);
                 }
                 // None of the chosen profiles knows it.

@@ -20,9 +20,23 @@ const LATE_SHARES: [f64; 13] = [0.0, 0.03, 0.06, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 
 const SERIAL_SHARES: [f64; 13] = [0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0];
 /// Boxes from which on another thread is called: always, or those of the methods of this library.
 const BOXES_PER_THREAD: [u32; 2] = [0, 1024];
-/// Rounds over all numbers, and serial shares to start from.
-const ROUNDS: usize = 6;
-const STARTS: [f64; 2] = [0.1, 0.4];
+/// Places in these lists to start from, and steps in them, coarse ones first.
+const STARTS: [[usize; 4]; 2] = [[0, 4, 4, 3], [0, 4, 4, 8]];
+const STEPS: [isize; 3] = [4, 2, 1];
+/// Moves that are tried. A more expensive call looks like a later helper, and both like less serial work.
+const MOVES: [[isize; 4]; 11] = [
+    [1, 0, 0, 0],
+    [0, 1, 0, 0],
+    [0, -1, 0, 0],
+    [0, 0, 1, 0],
+    [0, 0, -1, 0],
+    [0, 0, 0, 1],
+    [0, 0, 0, -1],
+    [0, 1, -1, 0],
+    [0, -1, 1, 0],
+    [0, 0, 1, -1],
+    [0, 0, -1, 1],
+];
 
 /// Returns the numbers with the least weighted sum of absolute logarithmic errors, which is robust: some frames wait
 /// for a core. `None` without timings.
@@ -30,36 +44,39 @@ pub(crate) fn fit(called: &[Called]) -> Option<HelpersModel> {
     if called.is_empty() {
         return None;
     }
+    let model = |[boxes, call, late, serial]: [usize; 4]| {
+        HelpersModel::new(CALL_CYCLES[call], LATE_SHARES[late], SERIAL_SHARES[serial], BOXES_PER_THREAD[boxes])
+    };
     // `None` once the sum reaches `least`.
-    let error = |model: &HelpersModel, least: f64| -> Option<f64> {
+    let error = |at: [usize; 4], least: f64| -> Option<f64> {
         called.iter().try_fold(0.0, |sum, c| {
-            let ns = model.with(c.figures, c.threads).cost_ns(c.objects, c.work_ns);
+            let ns = model(at).with(c.figures, c.threads).cost_ns(c.objects, c.work_ns);
             Some(sum + c.weight * (c.ns / ns).ln().abs()).filter(|sum| *sum < least)
         })
     };
-    let polished = |serial_share: f64| {
-        let mut best = HelpersModel::new(500.0, 0.2, serial_share, 0);
-        let mut least = error(&best, f64::INFINITY).unwrap_or(f64::INFINITY);
-        for _ in 0..ROUNDS {
-            let before = best;
-            let mut attempt = |model: HelpersModel| {
-                if let Some(error) = error(&model, least) {
-                    (best, least) = (model, error);
+    let most = [BOXES_PER_THREAD.len(), CALL_CYCLES.len(), LATE_SHARES.len(), SERIAL_SHARES.len()];
+    let polished = |mut best: [usize; 4]| {
+        let mut least = error(best, f64::INFINITY).unwrap_or(f64::INFINITY);
+        for step in STEPS {
+            loop {
+                let before = best;
+                for moves in MOVES {
+                    let to = std::array::from_fn(|k| match k {
+                        0 => best[0] ^ usize::from(moves[0] != 0),
+                        _ => best[k].saturating_add_signed(step * moves[k]).min(most[k] - 1),
+                    });
+                    if let Some(error) = error(to, least) {
+                        (best, least) = (to, error);
+                    }
                 }
-            };
-            BOXES_PER_THREAD.iter().for_each(|&boxes_per_thread| attempt(HelpersModel { boxes_per_thread, ..before }));
-            // Together: a more expensive call looks like a later helper.
-            for call_cycles in CALL_CYCLES {
-                LATE_SHARES.iter().for_each(|&late_share| attempt(HelpersModel { call_cycles, late_share, ..before }));
-            }
-            SERIAL_SHARES.iter().for_each(|&serial_share| attempt(HelpersModel { serial_share, ..before }));
-            if best == before {
-                break;
+                if best == before {
+                    break;
+                }
             }
         }
         (best, least)
     };
-    STARTS.map(polished).into_iter().min_by(|a, b| a.1.total_cmp(&b.1)).map(|found| found.0)
+    STARTS.map(polished).into_iter().min_by(|a, b| a.1.total_cmp(&b.1)).map(|found| model(found.0))
 }
 
 #[cfg(test)]

@@ -49,12 +49,11 @@ pub(crate) fn noise_ln(behind: f64) -> f64 {
 /// least: a pivoted Cholesky decomposition of the covariance (Fine and Scheinberg, Efficient SVM training using
 /// low-rank kernel representations, 2001).
 ///
-/// They are chosen once for all fits. Loads are the same on every machine, so that nothing of a held-out one leaks;
-/// of a held-out scenario the fit knows where its loads lie, and no time.
-pub(crate) fn places(profiles: &[Profile]) -> Places {
+/// They are chosen once for all fits: loads are the same on every machine, so that nothing of a held-out one leaks.
+pub(crate) fn places(profiles: &[Profile], without: Option<&str>) -> Places {
     // Profiles of one seed have the same scenes and loads.
     let mut loads: BTreeMap<(&str, u32), Load> = BTreeMap::new();
-    for spot in profiles.iter().flat_map(|p| &p.points) {
+    for spot in profiles.iter().flat_map(|p| &p.points).filter(|s| Some(s.scenario.as_str()) != without) {
         loads.entry((&spot.scenario, spot.load.objects)).or_insert(spot.load);
     }
     let loads: Vec<Load> = loads.into_values().collect();

@@ -1,7 +1,7 @@
 //! The costs of algorithms on one machine, from its own report.
 
 use crate::data::Profile;
-use crate::fit::designs::{Designs, TrainingSet};
+use crate::fit::designs::Designs;
 use crate::fit::load_residual::noise_ln;
 use crate::fit::model::model;
 use crate::fit::rows::{Row, rows};
@@ -26,7 +26,7 @@ pub fn measured_costs(profile: &Profile) -> (Vec<AlgorithmCost>, Vec<String>) {
 
 /// Returns the same, with the timings as corrections of what `base` predicts for the algorithms that it knows.
 pub(super) fn measured_costs_over(profile: &Profile, base: Option<&Model>) -> (Vec<AlgorithmCost>, Vec<String>) {
-    let all = rows(profile, 0);
+    let all = rows(profile, 0, None);
     let points = |k: usize| all.iter().filter(|r| usize::from(r.algorithm) == k && !r.floor).count();
     let known: Vec<Entry> = (profile.algorithms.iter().enumerate().filter(|(k, _)| points(*k) >= FEWEST_POINTS))
         .map(|(_, timed)| Entry::new(timed.id.clone(), timed.revision))
@@ -52,10 +52,20 @@ fn own_costs(profile: &Profile, some: &[Entry], base: Option<&Model>) -> Vec<Alg
     let mut own = profile.clone();
     own.hardware = completed(&own.hardware);
     let profiles = [own];
-    let designs = base.map_or_else(|| Designs::new(&profiles), |b| Designs::at(&profiles, Arc::clone(&b.places)));
+    let designs = base.map_or_else(|| Designs::new(&profiles), |b| Designs::at(&profiles, None, Arc::clone(&b.places)));
     // The caller reports the algorithms that could not be fitted.
-    let Ok((model, _)) = model(&profiles, &designs, TrainingSet::of(&[true]), "own") else { return Vec::new() };
+    let Ok((model, _)) = model(&designs, &[true], "own") else { return Vec::new() };
     model.predict(&profiles[0].hardware, some).map_or_else(|_| Vec::new(), |p| p.costs)
+}
+
+/// Returns the cost of each algorithm from one of several profiles alone, without the scenario that `designs` leave
+/// out. Algorithms whose hardware parameters are missing, or that have too few timings, have none.
+pub(crate) fn costs_of_one(designs: &Designs<'_>, k: usize) -> Vec<AlgorithmCost> {
+    let (profile, mut chosen) = (&designs.profiles[k], vec![false; designs.profiles.len()]);
+    chosen[k] = true;
+    let Ok((model, _)) = model(designs, &chosen, "own") else { return Vec::new() };
+    let costs = model.predict(&profile.hardware, &profile.with_revisions(&profile.available()));
+    costs.map_or_else(|_| Vec::new(), |p| corrected(&p.costs, profile, &rows(profile, 0, designs.without)))
 }
 
 /// Adds a value for each missing parameter that a model reads. Any value will do when all timings are of one machine:
@@ -133,7 +143,7 @@ mod tests {
     fn a_model_is_the_base_for_what_it_knows() {
         let [other, own] = [3, 0].map(|k| Profile::of("", &Machine::family()[k].report()));
         let designs = Designs::new(std::slice::from_ref(&other));
-        let mut base = model(std::slice::from_ref(&other), &designs, TrainingSet::of(&[true]), "base").unwrap().0;
+        let mut base = model(&designs, &[true], "base").unwrap().0;
         base.methods.retain(|m| m.method != "sap");
         let (costs, warnings) = measured_costs_over(&own, Some(&base));
         assert!(warnings.is_empty() && costs.len() == own.algorithms.len(), "{warnings:?}");

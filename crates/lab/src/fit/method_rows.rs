@@ -14,14 +14,14 @@ const FEWEST_OF_PROFILE: usize = 2;
 /// For each method on a class of processor the rows on one thread, or on GPUs, and those on several threads.
 type MethodRows = BTreeMap<(BackendClass, String), [Vec<Row>; 2]>;
 
-/// Returns the rows of all profiles, thinned when there are many.
-pub(super) fn rows_by_method(profiles: &[Profile]) -> MethodRows {
+/// Returns the rows of all profiles, without a scenario, thinned when there are many.
+pub(super) fn rows_by_method(profiles: &[Profile], without: Option<&str>) -> MethodRows {
     // If not every profile can add rows, some spread over all do.
     let step = (profiles.len() * FEWEST_OF_PROFILE).div_ceil(MOST_ROWS).max(1);
     let most = (MOST_ROWS / profiles.len().max(1)).max(FEWEST_OF_PROFILE);
     let of_profile = |(k, profile): (usize, &Profile)| -> MethodRows {
         let mut own = MethodRows::new();
-        for row in rows(profile, k) {
+        for row in rows(profile, k, without) {
             let id = profile.id(row.algorithm);
             let (class, several) = (id.backend().class(), id.backend().width() > 1);
             let place = usize::from(several && class == BackendClass::Cpu);

@@ -37,8 +37,8 @@ impl MinOfTwo {
             let went = |k: &usize| other[*k];
             let ratios = (0..rows).filter(went).map(|k| (problem.ns[k] / other_ns[k], problem.weights[k])).collect();
             found.factor = weighted_median(ratios).unwrap_or(USUAL_FACTOR).clamp(FACTORS.0, FACTORS.1);
-            let floors = (0..rows).map(|k| problem.floors[k] || other[k]).collect();
-            found.units = Problem { floors, ..problem.clone() }.units();
+            let floors: Vec<bool> = (0..rows).map(|k| problem.floors[k] || other[k]).collect();
+            found.units = problem.units_with(&floors);
             let first = problem.terms.dot(&Array1::from(found.units.clone()));
             let now: Vec<bool> = (0..rows)
                 .map(|k| !problem.floors[k] && off(k, other_ns[k] * found.factor) < off(k, first[k]))

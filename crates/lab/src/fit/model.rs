@@ -1,6 +1,6 @@
 //! A model, fitted to profiles.
 
-use super::designs::{Designs, Fitted, TrainingSet};
+use super::designs::{Designs, Fitted};
 use crate::data::{COMPARED, COMPARED_OF_GPUS, Profile, is_real};
 use anyhow::{Result, bail};
 use sapwise::algorithm::Backend;
@@ -13,14 +13,13 @@ use std::sync::Arc;
 /// # Errors
 /// When no method could be fitted, or a regression fails.
 pub fn model(
-    profiles: &[Profile],
     designs: &Designs<'_>,
-    training: TrainingSet<'_>,
+    chosen: &[bool],
     name: &str,
 ) -> Result<(Model, Vec<String>)> {
-    let Fitted { methods, notes } = designs.fit(training)?;
+    let Fitted { methods, notes } = designs.fit(chosen)?;
     let profiles: Vec<&Profile> =
-        profiles.iter().zip(training.profiles).filter(|(_, chosen)| **chosen).map(|(p, _)| p).collect();
+        designs.profiles.iter().zip(chosen).filter(|(_, chosen)| **chosen).map(|(p, _)| p).collect();
     let model = Model::new(name, methods, ranges(&profiles)).with_places(Arc::clone(designs.places()));
     if let Some(defect) = model.defect() {
         bail!("no model could be fitted: {}", [vec![defect.to_string()], notes].concat().join("; "));

@@ -7,7 +7,7 @@ use sapwise::internals::stats::robust_deviation;
 /// Times and the terms that should add up to them.
 #[derive(Debug, Clone)]
 pub(crate) struct Problem {
-    /// Nanoseconds for one unit of each term, shape (rows, terms).
+    /// Nanoseconds for one unit of each term, shape (rows, terms), best column by column in memory.
     pub(crate) terms: Array2<f64>,
     /// Nanoseconds of each row, above zero.
     pub(crate) ns: Vec<f64>,
@@ -17,10 +17,10 @@ pub(crate) struct Problem {
     pub(crate) floors: Vec<bool>,
 }
 
-/// Rounds of reweighting, at most. The units stop moving in the fourth digit after about eight.
+/// Rounds of reweighting, at most.
 const ROUNDS: usize = 15;
 /// The units stand still when no modelled row changes by more than this share.
-const STILL: f64 = 1e-9;
+const STILL: f64 = 1e-4;
 /// Residuals beyond this many standard deviations count linearly: Huber's constant for 95 % efficiency.
 const HUBER: f64 = 1.345;
 /// Least spread, so that a perfect fit does not turn rounding errors into outliers.
@@ -33,9 +33,14 @@ impl Problem {
     /// pull every fit down. Reweighting by `ln q / (q (q - 1))`, where `q` is modelled over measured time, makes the
     /// fixed point that of least squares on `ln q`. Outliers get Huber's weight on top.
     pub(crate) fn units(&self) -> Vec<f64> {
+        self.units_with(&self.floors)
+    }
+
+    /// Does the same with other rows whose time is a lower bound.
+    pub(crate) fn units_with(&self, floors: &[bool]) -> Vec<f64> {
         // The first round leaves out the lower bounds.
         let mut weights: Vec<f64> =
-            self.weights.iter().zip(&self.floors).map(|(weight, floor)| if *floor { 0.0 } else { *weight }).collect();
+            self.weights.iter().zip(floors).map(|(weight, floor)| if *floor { 0.0 } else { *weight }).collect();
         let mut violated = vec![false; self.ns.len()];
         let mut units = Array1::zeros(self.terms.ncols());
         let mut before = Array1::zeros(self.ns.len());
@@ -46,47 +51,48 @@ impl Problem {
             if !modelled.iter().zip(&before).any(moved) {
                 break;
             }
-            weights = self.reweighted(&modelled, &mut violated);
+            weights = self.reweighted(&modelled, floors, &mut violated);
             before = modelled;
         }
         units.to_vec()
     }
 
     /// Returns the weights of the next round.
-    fn reweighted(&self, modelled: &Array1<f64>, violated: &mut [bool]) -> Vec<f64> {
+    fn reweighted(&self, modelled: &Array1<f64>, floors: &[bool], violated: &mut [bool]) -> Vec<f64> {
         let ratios: Vec<f64> = modelled.iter().zip(&self.ns).map(|(m, t)| (m / t).max(1e-9)).collect();
-        let measured = ratios.iter().zip(&self.floors).filter(|(_, f)| !**f).map(|(q, _)| q.ln());
+        let ln: Vec<f64> = ratios.iter().map(|q| q.ln()).collect();
+        let measured = ln.iter().zip(floors).filter(|(_, f)| !**f).map(|(ln, _)| *ln);
         let spread = robust_deviation(&measured.collect::<Vec<f64>>()).unwrap_or(0.0).max(SMALLEST_SPREAD);
         let weight = |(k, &q): (usize, &f64)| {
-            let weight = self.weights[k] * to_logarithmic(q);
-            if self.floors[k] {
+            let weight = self.weights[k] * to_logarithmic(q, ln[k]);
+            if floors[k] {
                 violated[k] |= q < 1.0;
                 // A violated bound holds until it is cleared by a margin, or it would come and go every round.
                 weight * if violated[k] && q < 1.5 { 1.0 } else { 0.0 }
             } else {
-                weight * (HUBER * spread / q.ln().abs()).min(1.0)
+                weight * (HUBER * spread / ln[k].abs()).min(1.0)
             }
         };
         ratios.iter().enumerate().map(weight).collect()
     }
 
     fn weighted(&self, weights: &[f64]) -> Array1<f64> {
-        let scale = |k: usize| weights[k].sqrt() / self.ns[k];
+        let right: Array1<f64> = weights.iter().map(|w| w.sqrt()).collect();
+        let scale: Array1<f64> = right.iter().zip(&self.ns).map(|(root, ns)| root / ns).collect();
         let mut a = self.terms.clone();
-        for (k, mut row) in a.rows_mut().into_iter().enumerate() {
-            row *= scale(k);
-        }
-        nnls(&a, &Array1::from_shape_fn(self.ns.len(), |k| scale(k) * self.ns[k]))
+        a.columns_mut().into_iter().for_each(|mut column| column *= &scale);
+        nnls(&a, &right)
     }
 }
 
-/// Returns the weight that turns a relative error into a logarithmic one, at a ratio of modelled to measured time.
-fn to_logarithmic(q: f64) -> f64 {
+/// Returns the weight that turns a relative error into a logarithmic one, at a ratio of modelled to measured time and
+/// its logarithm.
+fn to_logarithmic(q: f64, ln: f64) -> f64 {
     if (q - 1.0).abs() < 1e-6 {
         return 1.0;
     }
     // Bounded, so that a row that is far too low in an early round does not decide that round alone.
-    (q.ln() / (q * (q - 1.0))).min(10.0)
+    (ln / (q * (q - 1.0))).min(10.0)
 }
 
 /// Returns the value at which half of the weight is reached, interpolated between the middles of neighbouring

@@ -28,8 +28,9 @@ pub struct Row {
 const LEFT_BEHIND: f64 = 2.0;
 
 /// Returns a row for each algorithm and point, and a lower bound for each point of a scenario beyond the last at
-/// which an algorithm was timed. `position` is that of the profile.
-pub fn rows(profile: &Profile, position: usize) -> Vec<Row> {
+/// which an algorithm was timed, without a scenario. `position` is that of the profile.
+pub fn rows(profile: &Profile, position: usize, without: Option<&str>) -> Vec<Row> {
+    let held = |(_, spot): &(usize, &Spot)| Some(spot.scenario.as_str()) != without;
     let mut rows = Vec::new();
     for (algorithm, timed) in profile.algorithms.iter().enumerate() {
         let algorithm = algorithm as u16;
@@ -44,7 +45,7 @@ pub fn rows(profile: &Profile, position: usize) -> Vec<Row> {
             behind,
             floor,
         };
-        for (k, spot) in profile.points.iter().enumerate() {
+        for (k, spot) in profile.points.iter().enumerate().filter(held) {
             let (Some(ns), Some(best)) = (spot.of_position(algorithm), spot.best()) else { continue };
             rows.push(row((k, spot), best, ns / best, false));
             ratios.entry(&spot.scenario).or_default().insert(spot.load.objects, ns / best);
@@ -57,7 +58,7 @@ pub fn rows(profile: &Profile, position: usize) -> Vec<Row> {
             .iter()
             .filter_map(|(s, course)| course.last_key_value().map(|(&n, &ratio)| (*s, (n, ratio))))
             .collect();
-        for (k, spot) in profile.points.iter().enumerate() {
+        for (k, spot) in profile.points.iter().enumerate().filter(held) {
             let Some(&(objects, behind)) = last.get(spot.scenario.as_str()) else { continue };
             if let Some(best) = spot.best().filter(|_| spot.load.objects > objects) {
                 rows.push(row((k, spot), best, (behind / 2.0).max(LEFT_BEHIND), true));
@@ -85,7 +86,7 @@ mod tests {
         let left = |report: &Report| {
             let profile = Profile::of("", report);
             let own = profile.position(&"grid-sap@gpu0".parse().unwrap()).unwrap();
-            rows(&profile, 0).iter().any(|r| r.algorithm == own && r.floor)
+            rows(&profile, 0, None).iter().any(|r| r.algorithm == own && r.floor)
         };
         let on_gpu = |id: &sapwise::AlgorithmId| id.to_string() == "grid-sap@gpu0";
         assert!(!left(&report));
@@ -105,7 +106,7 @@ mod tests {
     #[test]
     fn what_left_the_race_has_floors_beyond() {
         let profile = Profile::of("", &Machine::family()[0].report());
-        let rows = rows(&profile, 3);
+        let rows = rows(&profile, 3, None);
         // Half of the rows are of the other scenario, in which it left the race at another size.
         let brute = rows.iter().filter(|r| profile.id(r.algorithm).to_string() == "brute@cpu1");
         let brute: Vec<&Row> = brute.filter(|r| r.load.pairs == f64::from(r.load.objects)).collect();

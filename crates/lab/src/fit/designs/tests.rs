@@ -1,5 +1,5 @@
 use super::*;
-use crate::fit::rows::rows;
+use crate::fit::rows::{Row, rows};
 use crate::fit::weights::weights;
 use crate::report::Label;
 use crate::synthetic::{Machine, gpu_truth, truth};
@@ -19,14 +19,14 @@ fn fitted(profiles: &[Profile]) -> (Vec<MethodModel>, Vec<String>) {
 
 fn whole(profiles: &[Profile]) -> (Model, Vec<String>) {
     let designs = Designs::new(profiles);
-    let Fitted { methods, notes } = designs.fit(TrainingSet::of(&vec![true; profiles.len()])).unwrap();
+    let Fitted { methods, notes } = designs.fit(&vec![true; profiles.len()]).unwrap();
     (Model::new("test", methods, Vec::new()).with_places(Arc::clone(designs.places())), [designs.notes.clone(), notes].concat())
 }
 
 /// What a model predicts for the measured rows of a profile over what was measured.
 fn ratios(model: &Model, profile: &Profile, of: impl Fn(&AlgorithmId) -> bool) -> Vec<f64> {
     let costs = model.predict(&profile.hardware, &profile.with_revisions(&profile.available())).unwrap().costs;
-    let rows = rows(profile, 0).into_iter().filter(|r| !r.floor && of(profile.id(r.algorithm)));
+    let rows = rows(profile, 0, None).into_iter().filter(|r| !r.floor && of(profile.id(r.algorithm)));
     let ratio = |r: Row| {
         let cost = costs.iter().find(|c| c.algorithm == *profile.id(r.algorithm)).unwrap();
         cost.curve.cost_ns(&r.load) / r.ns
@@ -133,9 +133,7 @@ fn the_residual_repairs_a_term_that_is_missing() {
 #[test]
 fn a_scenario_that_is_left_out_is_not_looked_at() {
     let mut all = profiles(Machine::family().into_iter().take(3));
-    let chosen = vec![true; 3];
-    let without = TrainingSet { without: Some("clustered"), ..TrainingSet::of(&chosen) };
-    let fit = |all: &[Profile]| Designs::new(all).fit(without).unwrap().methods;
+    let fit = |all: &[Profile]| Designs::without(all, Some("clustered")).fit(&[true; 3]).unwrap().methods;
     let before = fit(&all);
     // A hundred times as slow there, but for who is best: what lies how far behind is a weight.
     for spot in all.iter_mut().flat_map(|p| &mut p.points).filter(|s| s.scenario == "clustered") {
