@@ -122,7 +122,7 @@ impl<'a> Material<'a> {
 
 impl<'a> Seen<'a> {
     pub(super) fn new(without: Option<&'a str>, designs: &'a Designs<'a>) -> Self {
-        let costs = designs.profiles().iter().map(|_| OnceLock::new()).collect();
+        let costs = designs.profiles.iter().map(|_| OnceLock::new()).collect();
         Self { without, designs, costs }
     }
 

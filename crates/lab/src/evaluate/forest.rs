@@ -105,7 +105,8 @@ impl Forest {
         let columns = examples.first().map_or(0, |e| e.features.len());
         // Column by column, as a tree looks for a split.
         let values = (0..columns).flat_map(|c| examples.iter().map(move |e| e.features[c])).collect();
-        let x = DenseMatrix::new(examples.len(), columns, values, true).context("the rows of a random forest differ")?;
+        let x =
+            DenseMatrix::new(examples.len(), columns, values, true).context("the rows of a random forest differ")?;
         let y: Vec<f64> = examples.iter().map(|e| e.ln_ns).collect();
         let parameters = RandomForestRegressorParameters::default()
             .with_n_trees(TREES)

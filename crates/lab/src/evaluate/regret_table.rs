@@ -100,15 +100,14 @@ impl RegretTable {
             groups.entry((&spot.scenario, quarter(spot))).or_default().push(spot);
         }
         let algorithms = profile.algorithms.len();
-        let costs: BTreeMap<(&str, i64), Vec<Option<f64>>> = groups
-            .iter()
-            .map(|(&at, spots)| (at, ln_costs(&spots.iter().map(|s| times(s)).collect::<Vec<_>>(), algorithms)))
-            .collect();
-        let over_best = |at: (&str, i64), k: usize| {
-            let cell = costs.get(&at)?;
-            let least = cell.iter().flatten().copied().min_by(f64::total_cmp)?;
-            Some((cell[k]? - least).exp())
+        // Over the best of each cell.
+        let over = |spots: &Vec<&Spot>| -> Vec<Option<f64>> {
+            let ln = ln_costs(&spots.iter().map(|s| times(s)).collect::<Vec<_>>(), algorithms);
+            let least = ln.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+            ln.into_iter().map(|ln| Some((ln? - least).exp())).collect()
         };
+        let costs: BTreeMap<(&str, i64), Vec<Option<f64>>> = groups.iter().map(|(&at, s)| (at, over(s))).collect();
+        let over_best = |at: (&str, i64), k: usize| costs.get(&at).and_then(|cell| cell[k]);
         let cells = groups.iter().map(|(&(scenario, quarter), spots)| Cell {
             scenario: scenario.to_owned(),
             decade: quarter as f64 / PER_DECADE,

@@ -3,7 +3,8 @@
 
 use crate::data::Profile;
 use crate::fit::late_helpers::{self, Called};
-use crate::fit::load_residual::{Basis, Groups, Remainder};
+use crate::fit::load_residual::{Basis, Features, Groups};
+use crate::fit::method_rows::thinned;
 use crate::fit::min_of_two::MinOfTwo;
 use crate::fit::robust::Problem;
 use crate::fit::rows::Row;
@@ -15,6 +16,7 @@ use sapwise::AlgorithmId;
 use sapwise::algorithm::{Backend, BackendClass};
 use sapwise::internals::stats::robust_deviation;
 use sapwise::internals::{Fallback, Places, Work};
+use sapwise_scenes::Random;
 use sapwise_tune::hardware::ParameterId;
 use sapwise_tune::model::{
     FallbackModel, GroupResidual, HelpersModel, MethodModel, ModelTerm, PredictError, ThreadFigures,
@@ -26,6 +28,9 @@ use std::sync::Arc;
 
 /// Points on one thread, or on GPUs, that a method needs on all machines together.
 pub(super) const FEWEST_POINTS: usize = 3;
+/// Rows that the terms are fitted to, about, and rows of each profile at least. A dozen coefficients need no more.
+const MOST_FITTED: usize = 6000;
+const FEWEST_OF_PROFILE: usize = 2;
 /// Timings on several threads that the parameters of helpers are fitted to, at most.
 const MOST_CALLED: usize = 1000;
 
@@ -39,8 +44,8 @@ pub(super) struct Design {
     pub(super) rows: Vec<Row>,
     /// Nanoseconds for one unit of each component, shape (rows, components).
     values: Array2<f64>,
-    /// The rows on several threads, with what their machines make of these.
-    called: Vec<(Row, ThreadFigures)>,
+    /// The rows on several threads, with what their machines make of these and the time on one thread.
+    called: Vec<(Row, ThreadFigures, Option<f64>)>,
     /// The groups of both for residuals.
     groups: [Groups; 2],
     /// The method was never timed on one thread, so that its time on several counts as its work.
@@ -55,11 +60,11 @@ impl Design {
         components: Vec<Component>,
         [alone, called]: [Vec<Row>; 2],
         (profiles, machines): (&[Profile], &[usize]),
-        basis: &Basis,
+        features: &Features,
         notes: &mut Vec<String>,
     ) -> Self {
         let (mut kept, mut values) = (Vec::new(), Vec::new());
-        let mut of_groups = [Vec::new(), Vec::new()];
+        let mut positions = [Vec::new(), Vec::new()];
         let mut note = |row: &Row, why: PredictError| {
             let (profile, id) = (&profiles[row.profile], profiles[row.profile].id(row.algorithm).to_string());
             // Of several GPUs one may lack a parameter.
@@ -81,7 +86,7 @@ impl Design {
             match ns.and_then(|ns| Ok((ns, at()?))) {
                 Ok((ns, at)) => {
                     values.extend(ns);
-                    of_groups[0].push((row.load, at, machines[row.profile]));
+                    positions[0].push(at);
                     kept.push(row);
                 }
                 Err(why) => note(&row, why),
@@ -94,14 +99,21 @@ impl Design {
             let at = || GroupResidual::of_threads(&profile.hardware, threads);
             match ThreadFigures::of(&profile.hardware, threads).and_then(|figures| Ok((figures, at()?))) {
                 Ok((figures, at)) => {
-                    of_groups[1].push((row.load, at, machines[row.profile]));
-                    with_figures.push((row, figures));
+                    positions[1].push(at);
+                    let alone = AlgorithmId::new(&method, Backend::Cpu(1)).ok().and_then(|one| profile.position(&one));
+                    let alone_ns = alone.and_then(|one| profile.points[row.spot as usize].of_position(one));
+                    with_figures.push((row, figures, alone_ns));
                 }
                 Err(why) => note(&row, why),
             }
         }
         let values = Array2::from_shape_vec((kept.len(), components.len()), values).unwrap_or_default();
-        let groups = of_groups.map(|rows| Groups::new(&rows, basis, is_incremental(&method)));
+        let [alone, several] = positions;
+        let groups = |rows: Vec<(&Row, Vec<f64>)>| Groups::new(&rows, machines, features, is_incremental(&method));
+        let groups = [
+            groups(kept.iter().zip(alone).collect()),
+            groups(with_figures.iter().map(|called| &called.0).zip(several).collect()),
+        ];
         Self { method, class, components, rows: kept, values, called: with_figures, groups, never_alone }
     }
 
@@ -150,24 +162,32 @@ impl Design {
         other: Option<&MethodModel>,
         basis: &Basis,
     ) -> Result<Option<MethodModel>> {
-        let measured: Vec<usize> = (0..rows.len()).filter(|&k| !self.rows[rows[k]].floor).collect();
-        let Some(first) = measured.first().filter(|_| measured.len() >= FEWEST_POINTS) else { return Ok(None) };
-        let row = |k: usize| &self.rows[rows[k]];
-        let all: Vec<&Row> = rows.iter().map(|&k| &self.rows[k]).collect();
-        let problem = Problem {
-            terms: Array2::from_shape_fn((rows.len(), self.components.len()).f(), |(k, j)| self.values[[rows[k], j]]),
-            ns: all.iter().map(|r| r.ns).collect(),
-            weights: weights(&all, machines),
-            floors: all.iter().map(|r| r.floor).collect(),
+        let measured: Vec<usize> = rows.iter().copied().filter(|&k| !self.rows[k].floor).collect();
+        let Some(&first) = measured.first().filter(|_| measured.len() >= FEWEST_POINTS) else { return Ok(None) };
+        let of_profiles = rows.chunk_by(|a, b| self.rows[*a].profile == self.rows[*b].profile);
+        let most = (MOST_FITTED / of_profiles.clone().count()).max(FEWEST_OF_PROFILE);
+        let some = |own: &[usize]| thinned(own.to_vec(), most, self.rows[own[0]].profile);
+        let fitted: Vec<usize> = of_profiles.flat_map(some).collect();
+        let problem = |rows: &[usize]| {
+            let all: Vec<&Row> = rows.iter().map(|&k| &self.rows[k]).collect();
+            let values = |(k, j): (usize, usize)| self.values[[rows[k], j]];
+            Problem {
+                terms: Array2::from_shape_fn((rows.len(), self.components.len()).f(), values),
+                ns: all.iter().map(|r| r.ns).collect(),
+                weights: weights(&all, machines),
+                floors: all.iter().map(|r| r.floor).collect(),
+            }
         };
-        let other_ns = other.map(|other| self.other_ns(&all, other, profiles, &basis.places)).transpose()?;
-        let min_of_two = other_ns.as_ref().map(|other_ns| MinOfTwo::fit(&problem, other_ns));
-        let units = Array1::from(min_of_two.as_ref().map_or_else(|| problem.units(), |found| found.units.clone()));
-        let modelled = match min_of_two.as_ref().zip(other_ns.as_ref()) {
-            Some((min_of_two, other_ns)) => min_of_two.modelled(&problem, other_ns),
-            None => problem.terms.dot(&units),
+        let other_ns =
+            |rows: &[usize]| other.map(|other| self.other_ns(rows, other, profiles, &basis.places)).transpose();
+        let (to_fit, all) = (problem(&fitted), problem(&measured));
+        let min_of_two = other_ns(&fitted)?.map(|other_ns| MinOfTwo::fit(&to_fit, &other_ns));
+        let units = Array1::from(min_of_two.as_ref().map_or_else(|| to_fit.units(), |found| found.units.clone()));
+        let modelled = match min_of_two.as_ref().zip(other_ns(&measured)?) {
+            Some((min_of_two, other_ns)) => min_of_two.modelled(&all, &other_ns),
+            None => all.terms.dot(&units),
         };
-        if measured.iter().any(|&k| modelled[k] <= 0.0) {
+        if modelled.iter().any(|ns| *ns <= 0.0) {
             return Ok(None);
         }
         let mut gpu_kinds: Vec<GpuKind> = rows.iter().flat_map(|&k| self.gpu_kinds(k, profiles)).collect();
@@ -175,18 +195,15 @@ impl Design {
         gpu_kinds.dedup();
         // The error on a software adapter is that of its CPU, twice as large on one machine as on another: no
         // function of the load.
-        let ln = |k: usize| (row(k).ns / modelled[k]).ln();
+        let ln: Vec<f64> = all.ns.iter().zip(&modelled).map(|(ns, modelled)| (ns / modelled).ln()).collect();
         let (residual, left) = match gpu_kinds[..] {
-            [GpuKind::Software] => (Vec::new(), measured.iter().map(|&k| ln(k)).collect()),
-            _ => {
-                let remainder = |&k: &usize| Remainder { row: rows[k], ln: ln(k), behind: row(k).behind };
-                self.groups[0].residual(basis, &measured.iter().map(remainder).collect::<Vec<_>>())?
-            }
+            [GpuKind::Software] => (Vec::new(), ln),
+            _ => self.groups[0].residual(basis, |k| measured.binary_search(&k).is_ok(), &ln)?,
         };
         let spread_ln = robust_deviation(&left).unwrap_or(0.0);
         let used = self.components.iter().zip(&units).filter(|(_, u)| **u > 0.0);
-        let width = |&k: &usize| self.id(rows[k], profiles).backend().width();
-        let revision = profiles[row(*first).profile].algorithms[usize::from(row(*first).algorithm)].revision;
+        let width = |&k: &usize| self.id(k, profiles).backend().width();
+        let revision = profiles[self.rows[first].profile].algorithms[usize::from(self.rows[first].algorithm)].revision;
         let mut model = MethodModel::new(&self.method, self.class, revision);
         model.max_threads = measured.iter().map(width).max().unwrap_or(1);
         model.gpu_kinds = gpu_kinds;
@@ -197,7 +214,8 @@ impl Design {
             .collect();
         model.fallback =
             min_of_two.zip(other).map(|(found, o)| FallbackModel { method: o.method.clone(), factor: found.factor });
-        (model.residual, model.residual_by_motion, model.spread_ln) = (residual, is_incremental(&self.method), spread_ln);
+        (model.residual, model.residual_by_motion, model.spread_ln) =
+            (residual, is_incremental(&self.method), spread_ln);
         Ok(Some(model))
     }
 
@@ -219,13 +237,11 @@ impl Design {
             model.helpers = (self.class == BackendClass::Cpu).then_some(HelpersModel::new(0.0, 0.0, 1.0, 0));
             return Ok(());
         }
-        let held: Vec<usize> =
-            (0..self.called.len()).filter(|&k| chosen[self.called[k].0.profile]).collect();
-        let all: Vec<&Row> = held.iter().map(|&k| &self.called[k].0).collect();
-        let weights = weights(&all, machines);
+        let held: Vec<_> = self.called.iter().filter(|(row, ..)| chosen[row.profile]).collect();
+        let weights = weights(&held.iter().map(|(row, ..)| row).collect::<Vec<_>>(), machines);
         let mut works: BTreeMap<usize, Work> = BTreeMap::new();
         let mut called = Vec::new();
-        for (k, row) in all.iter().enumerate() {
+        for ((row, figures, alone_ns), weight) in held.into_iter().zip(weights) {
             let profile = &profiles[row.profile];
             if let Entry::Vacant(place) = works.entry(row.profile) {
                 let one = &Backend::Cpu(1);
@@ -243,28 +259,20 @@ impl Design {
             called.push(Called {
                 objects: row.load.objects,
                 threads,
-                work_ns: self.alone_ns(row, profile).unwrap_or_else(|| works[&row.profile].ns(&row.load)),
+                work_ns: alone_ns.unwrap_or_else(|| works[&row.profile].ns(&row.load)),
                 ns: row.ns,
-                weight: weights[k],
-                figures: self.called[held[k]].1,
+                weight,
+                figures: *figures,
             });
         }
-        let step = called.len().div_ceil(MOST_CALLED).max(1);
-        model.helpers = late_helpers::fit(&called.iter().step_by(step).copied().collect::<Vec<_>>());
+        // At random: even steps would take the same few sizes from every scenario.
+        let some = Random::named(1, &["helpers"]).shuffled(called.len());
+        model.helpers = late_helpers::fit(&some.iter().take(MOST_CALLED).map(|&k| called[k]).collect::<Vec<_>>());
         let Some(helpers) = model.helpers else { return Ok(()) };
-        let remainder = |(k, c): (usize, &Called)| {
-            let modelled_ns = helpers.with(c.figures, c.threads).cost_ns(c.objects, c.work_ns);
-            Remainder { row: held[k], ln: (c.ns / modelled_ns).ln(), behind: all[k].behind }
-        };
-        let remainders: Vec<Remainder> = called.iter().enumerate().map(remainder).collect();
-        model.thread_residual = self.groups[1].residual(basis, &remainders)?.0;
+        let ln = |c: &Called| (c.ns / helpers.with(c.figures, c.threads).cost_ns(c.objects, c.work_ns)).ln();
+        let ln: Vec<f64> = called.iter().map(ln).collect();
+        model.thread_residual = self.groups[1].residual(basis, |k| chosen[self.called[k].0.profile], &ln)?.0;
         Ok(())
-    }
-
-    /// Returns the time of this method on one thread at the point of a row.
-    fn alone_ns(&self, row: &Row, profile: &Profile) -> Option<f64> {
-        let alone = profile.position(&AlgorithmId::new(&self.method, Backend::Cpu(1)).ok()?)?;
-        profile.points[row.spot as usize].of_position(alone)
     }
 
     /// Returns the modelled cost of the method that this one falls back to, in each row.
@@ -273,7 +281,7 @@ impl Design {
     /// When a machine lacks a parameter for it.
     fn other_ns(
         &self,
-        rows: &[&Row],
+        rows: &[usize],
         other: &MethodModel,
         profiles: &[Profile],
         places: &Arc<Places>,
@@ -281,7 +289,7 @@ impl Design {
         // Each GPU of a profile has its own.
         let mut works: BTreeMap<(usize, &Backend), Work> = BTreeMap::new();
         let mut all = Vec::with_capacity(rows.len());
-        for row in rows {
+        for row in rows.iter().map(|&k| &self.rows[k]) {
             let (profile, backend) = (&profiles[row.profile], profiles[row.profile].id(row.algorithm).backend());
             let at = (row.profile, backend);
             let work = match works.entry(at) {

@@ -15,13 +15,13 @@ use std::sync::Arc;
 /// The rows of every method with all that a fit needs, worked out once for all fits to parts of the profiles.
 #[derive(Debug)]
 pub struct Designs<'a> {
-    pub(super) profiles: &'a [Profile],
+    pub(crate) profiles: &'a [Profile],
     /// The scenario that is left out, if one is.
     pub(super) without: Option<&'a str>,
     /// Position of the physical machine of each profile, counted in the order of their first profiles.
     pub(super) machines: Vec<usize>,
     pub(super) methods: Vec<Design>,
-    basis: Basis,
+    pub(super) basis: Basis,
     /// What was left out because a parameter is missing.
     pub notes: Vec<String>,
 }
@@ -49,6 +49,7 @@ impl<'a> Designs<'a> {
     /// Does the same for residuals at these places.
     pub(super) fn at(profiles: &'a [Profile], without: Option<&'a str>, places: Arc<Places>) -> Self {
         let (mut notes, machines, basis) = (Vec::new(), machines(profiles), Basis::new(places));
+        let features = basis.features(profiles);
         let mut by_method: Vec<_> = rows_by_method(profiles, without).into_iter().collect();
         // A method that falls back to another one is fitted after that.
         by_method.sort_by_key(|((_, method), _)| fallback_method(method).is_some());
@@ -56,20 +57,10 @@ impl<'a> Designs<'a> {
             .into_iter()
             .map(|((class, method), rows)| {
                 let own = reported_terms(profiles, &method, class).unwrap_or_else(|| components(&method, class));
-                Design::new(method, class, own, rows, (profiles, &machines), &basis, &mut notes)
+                Design::new(method, class, own, rows, (profiles, &machines), &features, &mut notes)
             })
             .collect();
         Self { profiles, without, machines, methods, basis, notes }
-    }
-
-    /// Returns the profiles that the rows are of.
-    pub fn profiles(&self) -> &'a [Profile] {
-        self.profiles
-    }
-
-    /// Returns the loads at which residuals are fitted.
-    pub fn places(&self) -> &Arc<Places> {
-        &self.basis.places
     }
 
     /// Fits a cost model for each method and class of processor that the chosen profiles hold enough timings of.
@@ -82,8 +73,7 @@ impl<'a> Designs<'a> {
             let other = fallback_method(&design.method)
                 .and_then(|other| models.iter().find(|m| m.method == other && m.backend == design.class))
                 .cloned();
-            let mut rows: Vec<usize> =
-                (0..design.rows.len()).filter(|&k| chosen[design.rows[k].profile]).collect();
+            let mut rows: Vec<usize> = (0..design.rows.len()).filter(|&k| chosen[design.rows[k].profile]).collect();
             let note = "on GPUs, timings on software adapters are left out: there are timings on real GPUs".to_owned();
             if design.leave_out_software(&mut rows, self.profiles) && !notes.contains(&note) {
                 notes.push(note);

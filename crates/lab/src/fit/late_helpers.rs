@@ -23,20 +23,10 @@ const BOXES_PER_THREAD: [u32; 2] = [0, 1024];
 /// Places in these lists to start from, and steps in them, coarse ones first.
 const STARTS: [[usize; 4]; 2] = [[0, 4, 4, 3], [0, 4, 4, 8]];
 const STEPS: [isize; 3] = [4, 2, 1];
-/// Moves that are tried. A more expensive call looks like a later helper, and both like less serial work.
-const MOVES: [[isize; 4]; 11] = [
-    [1, 0, 0, 0],
-    [0, 1, 0, 0],
-    [0, -1, 0, 0],
-    [0, 0, 1, 0],
-    [0, 0, -1, 0],
-    [0, 0, 0, 1],
-    [0, 0, 0, -1],
-    [0, 1, -1, 0],
-    [0, -1, 1, 0],
-    [0, 0, 1, -1],
-    [0, 0, -1, 1],
-];
+/// Moves that are tried, three numbers each, after the one that changes when threads are called. A more expensive call
+/// looks like a later helper, and both like less serial work.
+const MOVES: [isize; 30] =
+    [1, 0, 0, -1, 0, 0, 0, 1, 0, 0, -1, 0, 0, 0, 1, 0, 0, -1, 1, -1, 0, -1, 1, 0, 0, 1, -1, 0, -1, 1];
 
 /// Returns the numbers with the least weighted sum of absolute logarithmic errors, which is robust: some frames wait
 /// for a core. `None` without timings.
@@ -54,17 +44,18 @@ pub(crate) fn fit(called: &[Called]) -> Option<HelpersModel> {
             Some(sum + c.weight * (c.ns / ns).ln().abs()).filter(|sum| *sum < least)
         })
     };
-    let most = [BOXES_PER_THREAD.len(), CALL_CYCLES.len(), LATE_SHARES.len(), SERIAL_SHARES.len()];
+    let most = [CALL_CYCLES.len(), LATE_SHARES.len(), SERIAL_SHARES.len()];
     let polished = |mut best: [usize; 4]| {
         let mut least = error(best, f64::INFINITY).unwrap_or(f64::INFINITY);
         for step in STEPS {
             loop {
                 let before = best;
-                for moves in MOVES {
-                    let to = std::array::from_fn(|k| match k {
-                        0 => best[0] ^ usize::from(moves[0] != 0),
-                        _ => best[k].saturating_add_signed(step * moves[k]).min(most[k] - 1),
-                    });
+                for moves in std::iter::once(&[0, 0, 0][..]).chain(MOVES.chunks_exact(3)) {
+                    let mut to = best;
+                    to[0] ^= usize::from(moves == [0, 0, 0]);
+                    for ((to, m), most) in to[1..].iter_mut().zip(moves).zip(&most) {
+                        *to = to.saturating_add_signed(step * m).min(most - 1);
+                    }
                     if let Some(error) = error(to, least) {
                         (best, least) = (to, error);
                     }

@@ -2,9 +2,11 @@
 //! points for each group of timings, with the covariance of [`GroupResidual`] between groups.
 
 use crate::data::Profile;
+use crate::fit::rows::Row;
 use anyhow::{Context, Result};
 use linfa_linalg::cholesky::Cholesky;
 use ndarray::{Array1, Array2, Axis, s};
+use rayon::prelude::*;
 use sapwise::algorithm::Load;
 use sapwise::internals::Places;
 use sapwise::internals::stats::robust_deviation;
@@ -91,6 +93,10 @@ pub(crate) struct Basis {
     roots: [Array2<f64>; 2],
 }
 
+/// What the residual at each point of each profile is a sum of, in coordinates in which its prior is a unit matrix;
+/// whatever moves and by motion.
+pub(crate) type Features = Vec<[Array2<f64>; 2]>;
+
 impl Basis {
     pub(crate) fn new(places: Arc<Places>) -> Self {
         let roots = [false, true].map(|by_motion| {
@@ -106,9 +112,17 @@ impl Basis {
         Self { places, roots }
     }
 
-    /// Returns what the residual under a load is a sum of, in coordinates in which its prior is a unit matrix.
-    fn features(&self, load: &Load, by_motion: bool) -> Array1<f64> {
-        before_each(&self.roots[usize::from(by_motion)], &self.places.likeness(load, by_motion))
+    /// Returns the features of all points.
+    pub(crate) fn features(&self, profiles: &[Profile]) -> Features {
+        let of = |profile: &Profile, by_motion: bool| {
+            let mut features = Array2::zeros((profile.points.len(), self.places.loads().len()));
+            for (spot, mut row) in profile.points.iter().zip(features.rows_mut()) {
+                let root = &self.roots[usize::from(by_motion)];
+                row.assign(&before_each(root, &self.places.likeness(&spot.load, by_motion)));
+            }
+            features
+        };
+        profiles.par_iter().map(|p| [of(p, false), of(p, true)]).collect()
     }
 
     /// Returns the weights of the places for weights of the features.
@@ -132,47 +146,56 @@ fn before_each(root: &Array2<f64>, right: &[f64]) -> Array1<f64> {
     x
 }
 
-/// The rows of a method, each with the group of timings that it belongs to. Timings of one machine form a group if
-/// their positions are equal when rounded to a quarter.
+/// The timings of one algorithm of a profile.
+#[derive(Debug)]
+struct Cell {
+    /// Position of its first timing among the rows.
+    first: usize,
+    /// Position among the groups.
+    group: usize,
+    /// Shape (timings, places).
+    features: Array2<f64>,
+    /// One over the variance of the noise, for each timing.
+    precision: Array1<f64>,
+    /// The information of all timings, shape (places, places).
+    block: Array2<f64>,
+}
+
+/// The timings of a method in groups, in the order of its rows. Timings of one machine form a group if their positions
+/// are equal when rounded to a quarter.
 #[derive(Debug)]
 pub(super) struct Groups {
     by_motion: bool,
     /// Position, as in [`GroupResidual::at`], and number of the physical machine.
     groups: Vec<(Vec<f64>, usize)>,
-    of_row: Vec<usize>,
-    /// Shape (rows, places).
-    features: Array2<f64>,
-}
-
-/// What a model leaves unexplained of one timing.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Remainder {
-    /// Position among the rows of the method.
-    pub(super) row: usize,
-    /// Natural logarithm of measured over modelled time.
-    pub(super) ln: f64,
-    /// Time over the best of the point.
-    pub(super) behind: f64,
+    cells: Vec<Cell>,
 }
 
 impl Groups {
-    /// Sorts rows by position and machine, each with its load.
-    pub(super) fn new(rows: &[(Load, Vec<f64>, usize)], basis: &Basis, by_motion: bool) -> Self {
-        let mut groups: Vec<(Vec<f64>, usize)> = Vec::new();
-        let mut of_row = Vec::with_capacity(rows.len());
-        let mut features = Array2::zeros((rows.len(), basis.places.loads().len()));
-        for ((load, at, machine), mut features) in rows.iter().zip(features.rows_mut()) {
-            let group = (at.iter().map(|x| (x * PER_LENGTH).round() / PER_LENGTH).collect(), *machine);
-            of_row.push(groups.iter().position(|known| *known == group).unwrap_or(groups.len()));
-            if of_row.last() == Some(&groups.len()) {
+    /// Sorts rows, which come with their positions, the rows of an algorithm in succession. Lower bounds don't count.
+    pub(super) fn new(rows: &[(&Row, Vec<f64>)], machines: &[usize], features: &Features, by_motion: bool) -> Self {
+        let (mut groups, mut cells): (Vec<(Vec<f64>, usize)>, _) = (Vec::new(), Vec::new());
+        let measured: Vec<usize> = (0..rows.len()).filter(|&k| !rows[k].0.floor).collect();
+        let source = |k: usize| (rows[k].0.profile, rows[k].0.algorithm);
+        for own in measured.chunk_by(|&a, &b| source(a) == source(b)) {
+            let (first, at) = &rows[own[0]];
+            let group = (at.iter().map(|x| (x * PER_LENGTH).round() / PER_LENGTH).collect(), machines[first.profile]);
+            let known = groups.iter().position(|known| *known == group);
+            let spots: Vec<usize> = own.iter().map(|&k| rows[k].0.spot as usize).collect();
+            let features = features[first.profile][usize::from(by_motion)].select(Axis(0), &spots);
+            let precision = Array1::from_iter(own.iter().map(|&k| noise_ln(rows[k].0.behind).powi(-2)));
+            let block = (&features * &precision.view().insert_axis(Axis(1))).t().dot(&features);
+            cells.push(Cell { first: own[0], group: known.unwrap_or(groups.len()), features, precision, block });
+            if known.is_none() {
                 groups.push(group);
             }
-            features.assign(&basis.features(load, by_motion));
         }
-        Self { by_motion, groups, of_row, features }
+        Self { by_motion, groups, cells }
     }
 
     /// Returns the most likely residual of each position at which there are timings, and what it leaves of each.
+    /// `chosen` are the algorithms of profiles that count, by the position of the first timing, and `ln` the natural
+    /// logarithms of measured over modelled time of all their timings.
     ///
     /// Minimises `sum (y - K w)^2 / noise^2` plus the prior of all groups together, by conjugate gradients.
     ///
@@ -181,21 +204,24 @@ impl Groups {
     pub(super) fn residual(
         &self,
         basis: &Basis,
-        remainders: &[Remainder],
+        chosen: impl Fn(usize) -> bool,
+        ln: &[f64],
     ) -> Result<(Vec<GroupResidual>, Vec<f64>)> {
-        let spread = robust_deviation(&remainders.iter().map(|r| r.ln).collect::<Vec<f64>>()).unwrap_or(0.0);
-        let reach = (REACH * spread).max(LEAST_REACH_LN);
-        let mut members: BTreeMap<usize, Vec<&Remainder>> = BTreeMap::new();
-        remainders.iter().for_each(|r| members.entry(self.of_row[r.row]).or_default().push(r));
-        let (mut blocks, mut right) = (Vec::new(), Array2::zeros((members.len(), self.features.ncols())));
-        for (group, mut right) in members.values().zip(right.rows_mut()) {
-            let features = self.features.select(Axis(0), &group.iter().map(|r| r.row).collect::<Vec<_>>());
-            let precision = Array1::from_iter(group.iter().map(|r| noise_ln(r.behind).powi(-2)));
-            let weighted = &features * &precision.insert_axis(Axis(1));
-            right.assign(&weighted.t().dot(&Array1::from_iter(group.iter().map(|r| r.ln.clamp(-reach, reach)))));
-            blocks.push(weighted.t().dot(&features));
+        let reach = (REACH * robust_deviation(ln).unwrap_or(0.0)).max(LEAST_REACH_LN);
+        let targets: Array1<f64> = ln.iter().map(|ln| ln.clamp(-reach, reach)).collect();
+        let count = basis.places.loads().len();
+        let mut sums: BTreeMap<usize, (Array2<f64>, Array1<f64>)> = BTreeMap::new();
+        let cells: Vec<&Cell> = self.cells.iter().filter(|cell| chosen(cell.first)).collect();
+        let mut passed = 0;
+        for cell in &cells {
+            let empty = || (Array2::zeros((count, count)), Array1::zeros(count));
+            let (block, right) = sums.entry(cell.group).or_insert_with(empty);
+            let own = targets.slice(s![passed..passed + cell.precision.len()]);
+            passed += cell.precision.len();
+            *block += &cell.block;
+            *right += &(&own * &cell.precision).dot(&cell.features);
         }
-        let groups: Vec<&(Vec<f64>, usize)> = members.keys().map(|k| &self.groups[*k]).collect();
+        let groups: Vec<&(Vec<f64>, usize)> = sums.keys().map(|k| &self.groups[*k]).collect();
         // Of one machine alone, what is special about it can't be told from what all have.
         let several = groups.iter().any(|g| g.1 != groups[0].1);
         let covariance = Array2::from_shape_fn((groups.len(), groups.len()), |(a, b)| {
@@ -204,19 +230,22 @@ impl Groups {
             GroupResidual::covariance(&groups[a].0, &groups[b].0) + of_machine + own
         });
         let root = covariance.cholesky().context("the residual over the load can't be solved")?;
-        let weights = weights(&root, &blocks, &right);
         // What was special about a machine is dropped: groups at one position count by their sum.
         let mut residual: Vec<GroupResidual> = Vec::new();
-        for ((at, _), weights) in groups.into_iter().zip(weights.rows()) {
+        let (blocks, right): (Vec<_>, Vec<_>) = sums.into_values().unzip();
+        for ((at, _), weights) in groups.into_iter().zip(weights(&root, &blocks, &right).rows()) {
             match residual.iter_mut().find(|known| known.at == *at) {
                 Some(known) => known.weights.iter_mut().zip(weights).for_each(|(sum, w)| *sum += w),
                 None => residual.push(GroupResidual { at: at.clone(), weights: weights.to_vec() }),
             }
         }
-        let of_groups: Vec<Array1<f64>> =
-            self.groups.iter().map(|(at, _)| Array1::from(GroupResidual::weights_at(&residual, at))).collect();
-        let left = |r: &Remainder| r.ln - self.features.row(r.row).dot(&of_groups[self.of_row[r.row]]);
-        let left = remainders.iter().map(left).collect();
+        let mut left = Vec::with_capacity(ln.len());
+        for cell in &cells {
+            let weights = Array1::from(GroupResidual::weights_at(&residual, &self.groups[cell.group].0));
+            left.extend(
+                cell.features.dot(&weights).iter().zip(&ln[left.len()..]).map(|(explained, ln)| ln - explained),
+            );
+        }
         residual.iter_mut().for_each(|g| g.weights = basis.of_places(std::mem::take(&mut g.weights), self.by_motion));
         Ok((residual, left))
     }
@@ -227,7 +256,8 @@ impl Groups {
 ///
 /// Solves for `z` with `u = root z`, which has a unit matrix as its prior and needs no inverse of a covariance of
 /// which machines and positions make most groups the sum of others.
-fn weights(root: &Array2<f64>, blocks: &[Array2<f64>], right: &Array2<f64>) -> Array2<f64> {
+fn weights(root: &Array2<f64>, blocks: &[Array2<f64>], right: &[Array1<f64>]) -> Array2<f64> {
+    let right = Array2::from_shape_fn((right.len(), right.first().map_or(0, Array1::len)), |(g, k)| right[g][k]);
     let of_blocks = |z: &Array2<f64>| {
         let mut u = root.dot(z);
         u.rows_mut().into_iter().zip(blocks).for_each(|(mut u, block)| u.assign(&block.dot(&u)));
@@ -235,16 +265,14 @@ fn weights(root: &Array2<f64>, blocks: &[Array2<f64>], right: &Array2<f64>) -> A
     };
     let dot = |a: &Array2<f64>, b: &Array2<f64>| (a * b).sum();
     let mut z = Array2::zeros(right.raw_dim());
-    let mut left = root.t().dot(right);
+    let mut left = root.t().dot(&right);
     let mut step = left.clone();
     let mut length = dot(&left, &left);
     let enough = SOLVED.powi(2) * length;
-    let mut steps=0;
     for _ in 0..MOST_STEPS {
         if length <= enough {
             break;
         }
-        steps+=1;
         let image = &step + &root.t().dot(&of_blocks(&step));
         let share = length / dot(&step, &image);
         z.scaled_add(share, &step);
@@ -253,7 +281,6 @@ fn weights(root: &Array2<f64>, blocks: &[Array2<f64>], right: &Array2<f64>) -> A
         step = &left + &(next / length * step);
         length = next;
     }
-    if std::env::var_os("CGS").is_some() { eprintln!("cg {} groups {steps} steps", blocks.len()); }
     right - &of_blocks(&z)
 }
 
@@ -268,57 +295,73 @@ mod tests {
         Machine::family().into_iter().take(2).map(|m| Profile::of(m.name, &m.report())).collect()
     }
 
+    /// The residual at a position, of machines with these positions that were timed at all points of a profile with
+    /// these remainders.
+    fn residual(profile: &Profile, machines: &[f64], ln: impl Fn(usize, &Spot) -> f64, position: f64) -> Residual {
+        let all = vec![profile.clone(); machines.len()];
+        let basis = Basis::new(Arc::new(places(&all, None)));
+        let row = |m: usize, (k, s): (usize, &Spot)| Row {
+            profile: m,
+            algorithm: 0,
+            spot: k as u32,
+            load: s.load,
+            ns: 1.0,
+            behind: 1.0,
+            floor: false,
+        };
+        let of = |m: usize| all[m].points.iter().enumerate().map(move |spot| row(m, spot));
+        let rows: Vec<Row> = (0..all.len()).flat_map(of).collect();
+        let rows: Vec<(&Row, Vec<f64>)> = rows.iter().map(|r| (r, vec![machines[r.profile]])).collect();
+        let numbers: Vec<usize> = (0..all.len()).collect();
+        let groups = Groups::new(&rows, &numbers, &basis.features(&all), false);
+        let ln: Vec<f64> = rows.iter().map(|(r, _)| ln(r.profile, &all[r.profile].points[r.spot as usize])).collect();
+        let (found, left) = groups.residual(&basis, |_| true, &ln).unwrap();
+        let at = |at: f64| {
+            let weights = GroupResidual::weights_at(&found, &[at]);
+            Residual::new(Arc::clone(&basis.places), weights, false)
+        };
+        for ((row, own), (ln, left)) in rows.iter().zip(ln.iter().zip(left)) {
+            assert!((at(own[0]).ln(&row.load) + left - ln).abs() < 1e-3);
+        }
+        at(position)
+    }
+
     #[test]
     fn places_are_loads_of_the_profiles_and_none_twice() {
         let all = profiles();
-        let found = places(all.iter(), None);
+        let found = places(&all, None);
         assert!(found.loads().len() >= 20 && found.loads().len() <= Places::MOST);
         for (k, load) in found.loads().iter().enumerate() {
             assert!(all.iter().flat_map(|p| &p.points).any(|s| s.load == *load));
             assert!(!found.loads()[..k].contains(load));
         }
-        let without = places(all.iter(), Some("clustered"));
+        let without = places(&all, Some("clustered"));
         assert!(without.loads().iter().all(|l| all[0].points.iter().any(|s| s.load == *l && s.scenario == "uniform")));
     }
 
     #[test]
     fn a_smooth_remainder_is_found_and_a_far_timing_is_held_back() {
         let all = profiles();
-        let found = places(all.iter(), None);
         let truth = |l: &Load| {
             0.3 * (f64::from(l.objects).log2() / 4.0).sin() + 0.1 * (l.pairs / f64::from(l.objects)).min(1.0)
         };
-        let remainder =
-            |s: &Spot| Remainder { load: s.load, ln: truth(&s.load), behind: 1.0, machine: 0, at: vec![2.0] };
-        let mut remainders: Vec<Remainder> = all[0].points.iter().map(remainder).collect();
-        let residual = |r: &[Remainder]| {
-            let groups = residual(&found, r, false).unwrap();
-            Residual::new(Arc::clone(&found), GroupResidual::weights_at(&groups, &[2.0]), false)
+        let worst = |disturbed: f64| {
+            let far = |s: &Spot| if *s == all[0].points[7] { disturbed } else { 0.0 };
+            let found = residual(&all[0], &[2.0], |_, s| truth(&s.load) + far(s), 2.0);
+            all[0].points.iter().map(|s| (found.ln(&s.load) - truth(&s.load)).abs()).fold(0.0, f64::max)
         };
-        let worst = |residual: &Residual| {
-            let off = all[0].points.iter().map(|s| (residual.ln(&s.load) - truth(&s.load)).abs());
-            off.fold(0.0, f64::max)
-        };
-        assert!(worst(&residual(&remainders)) < 0.06, "{}", worst(&residual(&remainders)));
-        remainders[7].ln += 4.0;
-        assert!(worst(&residual(&remainders)) < 0.35, "{}", worst(&residual(&remainders)));
+        assert!(worst(0.0) < 0.06, "{}", worst(0.0));
+        assert!(worst(4.0) < 0.35, "{}", worst(4.0));
     }
 
     #[test]
     fn a_new_machine_gets_what_machines_of_its_kind_share() {
         let all = profiles();
-        let found = places(all.iter(), None);
         // The mean over all loads at a position, of machines with these remainders and positions.
         let at = |machines: &[(f64, f64)], position: f64| {
-            let of = |(machine, &(ln, at)): (usize, &(f64, f64))| {
-                let remainder = move |s: &Spot| Remainder { load: s.load, ln, behind: 1.0, machine, at: vec![at] };
-                all[0].points.iter().map(remainder).collect::<Vec<_>>()
-            };
-            let groups =
-                residual(&found, &machines.iter().enumerate().flat_map(of).collect::<Vec<_>>(), false).unwrap();
-            let weights = GroupResidual::weights_at(&groups, &[position]);
-            let residual = Residual::new(Arc::clone(&found), weights, false);
-            all[0].points.iter().map(|s| residual.ln(&s.load)).sum::<f64>() / all[0].points.len() as f64
+            let positions: Vec<f64> = machines.iter().map(|m| m.1).collect();
+            let found = residual(&all[0], &positions, |m, _| machines[m].0, position);
+            all[0].points.iter().map(|s| found.ln(&s.load)).sum::<f64>() / all[0].points.len() as f64
         };
         let opposed = at(&[(0.2, 2.0), (-0.2, 2.0)], 2.0);
         assert!(opposed.abs() < 0.01, "{opposed}");
@@ -334,17 +377,22 @@ mod tests {
         let block =
             |k: f64| Array2::from_shape_fn((3, 3), |(a, b)| if a == b { 5.0 + k } else { k / (1 + a + b) as f64 });
         let blocks = [block(0.5), block(2.0)];
-        let inverse = ndarray::array![[2.0, -0.5], [-0.5, 1.0]];
-        let right = ndarray::array![[1.0, -2.0, 3.0], [0.5, 4.0, -1.0]];
-        let x = solved(&inverse, &blocks, &right).unwrap();
-        let mut image = inverse.dot(&x);
-        image.rows_mut().into_iter().zip(&blocks).zip(x.rows()).for_each(|((mut to, m), x)| to += &m.dot(&x));
-        assert!((image - right).iter().all(|off| off.abs() < 1e-3));
+        let covariance = ndarray::array![[2.0, 0.5], [0.5, 1.0]];
+        let right = [ndarray::array![1.0, -2.0, 3.0], ndarray::array![0.5, 4.0, -1.0]];
+        let found = weights(&covariance.cholesky().unwrap(), &blocks, &right);
+        // The residual of the groups, by the weights.
+        let u = covariance.dot(&found);
+        for (k, right) in right.iter().enumerate() {
+            let image = &found.row(k) + &blocks[k].dot(&u.row(k));
+            assert!((image - right).iter().all(|off: &f64| off.abs() < 1e-3));
+        }
     }
 
     #[test]
     fn without_rows_nothing_is_corrected() {
-        let found = places(profiles().iter(), None);
-        assert_eq!(residual(&found, &[], true).unwrap(), []);
+        let all = profiles();
+        let basis = Basis::new(Arc::new(places(&all, None)));
+        let groups = Groups::new(&[], &[0, 1], &basis.features(&all), true);
+        assert_eq!(groups.residual(&basis, |_| true, &[]).unwrap(), (Vec::new(), Vec::new()));
     }
 }

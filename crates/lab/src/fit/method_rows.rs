@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use sapwise::algorithm::BackendClass;
 use std::collections::BTreeMap;
 
-/// Rows of a method, about. Its dozen coefficients need no more, and the time of a fit is proportional to them.
-const MOST_ROWS: usize = 6000;
+/// Rows of a method that are kept, about. In the features of its residual each takes 512 bytes.
+const MOST_ROWS: usize = 30_000;
 /// Rows of a method that each profile adds at least.
 const FEWEST_OF_PROFILE: usize = 2;
 
@@ -39,7 +39,7 @@ pub(super) fn rows_by_method(profiles: &[Profile], without: Option<&str>) -> Met
 }
 
 /// Returns at most `most` of the rows, evenly spaced, others for each `turn`.
-pub(crate) fn thinned(rows: Vec<Row>, most: usize, turn: usize) -> Vec<Row> {
+pub(crate) fn thinned<T>(rows: Vec<T>, most: usize, turn: usize) -> Vec<T> {
     let all = rows.len();
     if all <= most {
         return rows;

@@ -17,8 +17,8 @@ mod terms;
 mod weights;
 
 pub use designs::{Designs, Fitted};
-pub use measured_costs::measured_costs;
 pub(crate) use measured_costs::costs_of_one;
+pub use measured_costs::measured_costs;
 pub use measured_tuning::{measured_slice, measured_tuning, slice_tuning};
 pub(crate) use method_rows::thinned;
 pub use model::model;

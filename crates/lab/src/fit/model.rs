@@ -12,15 +12,11 @@ use std::sync::Arc;
 ///
 /// # Errors
 /// When no method could be fitted, or a regression fails.
-pub fn model(
-    designs: &Designs<'_>,
-    chosen: &[bool],
-    name: &str,
-) -> Result<(Model, Vec<String>)> {
+pub fn model(designs: &Designs<'_>, chosen: &[bool], name: &str) -> Result<(Model, Vec<String>)> {
     let Fitted { methods, notes } = designs.fit(chosen)?;
     let profiles: Vec<&Profile> =
         designs.profiles.iter().zip(chosen).filter(|(_, chosen)| **chosen).map(|(p, _)| p).collect();
-    let model = Model::new(name, methods, ranges(&profiles)).with_places(Arc::clone(designs.places()));
+    let model = Model::new(name, methods, ranges(&profiles)).with_places(Arc::clone(&designs.basis.places));
     if let Some(defect) = model.defect() {
         bail!("no model could be fitted: {}", [vec![defect.to_string()], notes].concat().join("; "));
     }

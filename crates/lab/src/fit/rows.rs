@@ -32,6 +32,7 @@ const LEFT_BEHIND: f64 = 2.0;
 pub fn rows(profile: &Profile, position: usize, without: Option<&str>) -> Vec<Row> {
     let held = |(_, spot): &(usize, &Spot)| Some(spot.scenario.as_str()) != without;
     let mut rows = Vec::new();
+    let bests: Vec<Option<f64>> = profile.points.iter().map(Spot::best).collect();
     for (algorithm, timed) in profile.algorithms.iter().enumerate() {
         let algorithm = algorithm as u16;
         // The time over the best at each size of each scenario.
@@ -46,7 +47,7 @@ pub fn rows(profile: &Profile, position: usize, without: Option<&str>) -> Vec<Ro
             floor,
         };
         for (k, spot) in profile.points.iter().enumerate().filter(held) {
-            let (Some(ns), Some(best)) = (spot.of_position(algorithm), spot.best()) else { continue };
+            let (Some(ns), Some(best)) = (spot.of_position(algorithm), bests[k]) else { continue };
             rows.push(row((k, spot), best, ns / best, false));
             ratios.entry(&spot.scenario).or_default().insert(spot.load.objects, ns / best);
         }
@@ -60,7 +61,7 @@ pub fn rows(profile: &Profile, position: usize, without: Option<&str>) -> Vec<Ro
             .collect();
         for (k, spot) in profile.points.iter().enumerate().filter(held) {
             let Some(&(objects, behind)) = last.get(spot.scenario.as_str()) else { continue };
-            if let Some(best) = spot.best().filter(|_| spot.load.objects > objects) {
+            if let Some(best) = bests[k].filter(|_| spot.load.objects > objects) {
                 rows.push(row((k, spot), best, (behind / 2.0).max(LEFT_BEHIND), true));
             }
         }

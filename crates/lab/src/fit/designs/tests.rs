@@ -20,7 +20,10 @@ fn fitted(profiles: &[Profile]) -> (Vec<MethodModel>, Vec<String>) {
 fn whole(profiles: &[Profile]) -> (Model, Vec<String>) {
     let designs = Designs::new(profiles);
     let Fitted { methods, notes } = designs.fit(&vec![true; profiles.len()]).unwrap();
-    (Model::new("test", methods, Vec::new()).with_places(Arc::clone(designs.places())), [designs.notes.clone(), notes].concat())
+    (
+        Model::new("test", methods, Vec::new()).with_places(Arc::clone(&designs.basis.places)),
+        [designs.notes.clone(), notes].concat(),
+    )
 }
 
 /// What a model predicts for the measured rows of a profile over what was measured.
