@@ -21,6 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [scenario, simd] = &words[..] else { return Err("usage: instructions SCENARIO SIMD_LEVEL".into()) };
     let mut registry = Registry::with_cores(1);
     registry.limit_simd(simd.parse::<SimdLevel>()?);
+    registry.ignore_clock();
     let frames = frames(scenario.parse()?);
     for method in METHODS {
         let mut algorithm = registry.create(&format!("{method}@cpu1").parse::<AlgorithmId>()?)?;

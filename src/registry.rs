@@ -168,6 +168,13 @@ impl Registry {
         self.threads.pinned = true;
     }
 
+    /// Makes algorithms that are created from now on decide by counted work, and not by the clock: then they do the same
+    /// work in every run. For tests that count.
+    #[doc(hidden)]
+    pub fn ignore_clock(&mut self) {
+        self.threads.untimed = true;
+    }
+
     /// Makes the threads of a program's own pool the helpers of built-in algorithms that are created from now on, in
     /// place of own pools. Algorithms on GPUs keep their own threads, which wait for drivers.
     ///

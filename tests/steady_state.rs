@@ -106,7 +106,9 @@ fn tuning(registry: &Registry) -> Tuning {
 #[test]
 fn steady_state_allocates_nothing() {
     const FRAMES: usize = 40;
-    let registry = Registry::with_cores(4);
+    let mut registry = Registry::with_cores(4);
+    // By the clock an algorithm may take another way through a frame late in the run, and grows its memory then.
+    registry.ignore_clock();
     for id in registry.available().into_iter().map(|e| e.id) {
         let mut algorithm = registry.create(&id).unwrap();
         let rounds = if id.method() == "pair-cache" { 7 } else { 2 };

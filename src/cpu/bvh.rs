@@ -5,7 +5,7 @@
 
 use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, check_count};
-use crate::clock::{Instant, TICKS};
+use crate::clock::Instant;
 use crate::cpu::Threads;
 use crate::cpu::level::Simd;
 use crate::cpu::tree::{Tree, Upkeep};
@@ -25,7 +25,12 @@ struct Bvh {
 
 pub(super) fn create(threads: u32, pools: &Threads, simd: Simd) -> Result<Box<dyn BroadPhase>, Error> {
     let workers = Workers::new("bvh", threads, pools)?;
-    Ok(Box::new(Bvh { workers, tree: Tree::new(simd), upkeep: Upkeep::new(TICKS), outputs: Outputs::default() }))
+    Ok(Box::new(Bvh {
+        workers,
+        tree: Tree::new(simd),
+        upkeep: Upkeep::new(pools.timed()),
+        outputs: Outputs::default(),
+    }))
 }
 
 impl BroadPhase for Bvh {

@@ -15,7 +15,7 @@ mod tree;
 
 use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, FrameKind, FrameWork, check_count};
-use crate::clock::{Instant, TICKS};
+use crate::clock::Instant;
 use crate::cpu::Threads;
 use crate::cpu::columns::part;
 use crate::cpu::kernel::{overlap, prefetch};
@@ -69,7 +69,7 @@ enum Kept {
 
 /// Makes an instance for any of these numbers of threads, ascending. It begins with the least.
 pub(super) fn create(threads: &[u32], pools: &Threads, simd: Simd) -> Result<Box<dyn BroadPhase>, Error> {
-    Ok(Box::new(pair_cache(threads, pools, simd, TICKS)?))
+    Ok(Box::new(pair_cache(threads, pools, simd, pools.timed())?))
 }
 
 /// `timed`: it decides by the clock.

@@ -1,5 +1,6 @@
 //! The thread pools of a registry.
 
+use crate::clock;
 #[cfg(feature = "parallel")]
 use crate::cpu::helpers::Helpers;
 use crate::error::Unavailable;
@@ -16,6 +17,9 @@ pub struct Threads {
     /// Whether the threads of pools made from now on are pinned; see
     /// [`Registry::pin_threads`](crate::Registry::pin_threads).
     pub pinned: bool,
+    /// Whether algorithms made from now on decide by counted work, and not by the clock: then they do the same work in
+    /// every run.
+    pub untimed: bool,
     #[cfg(feature = "parallel")]
     pools: Mutex<BTreeMap<u32, Arc<Helpers>>>,
     /// The program's pool, with the number of its threads; see [`Registry::use_pool`](crate::Registry::use_pool).
@@ -26,13 +30,7 @@ pub struct Threads {
 impl Threads {
     /// Makes pools whose threads are pinned.
     pub fn pinned() -> Self {
-        Self {
-            pinned: true,
-            #[cfg(feature = "parallel")]
-            pools: Mutex::default(),
-            #[cfg(feature = "parallel")]
-            given: None,
-        }
+        Self { pinned: true, ..Self::default() }
     }
 
     /// Takes a program's pool. Its threads run where the program has them.
@@ -50,6 +48,11 @@ impl Threads {
             (None, true) => "pinned",
             (None, false) => "free",
         }
+    }
+
+    /// Returns whether algorithms decide by measured times.
+    pub(crate) fn timed(&self) -> bool {
+        clock::TICKS && !self.untimed
     }
 
     /// Returns the most threads of an algorithm, its caller among them, if the program's pool bounds them.

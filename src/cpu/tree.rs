@@ -194,7 +194,7 @@ impl Tree {
                 valid.store(false, Relaxed);
             }
         });
-        for level in 1..used - 1 {
+        for level in 1..used.saturating_sub(1) {
             let (below, here) = levels.split_at_mut(level + 1);
             here[0].fill(Node::EMPTY);
             for (at, node) in below[level].iter().enumerate() {

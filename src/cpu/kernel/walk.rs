@@ -4,6 +4,7 @@ use super::node::{Group, LANES, Node};
 use super::prefetch;
 use crate::aabb::Aabb;
 use crate::cpu::level::Simd;
+use crate::pair::Pair;
 use crate::pairs::{Pairs, each_bit};
 use std::ops::Range;
 
@@ -51,7 +52,7 @@ impl Walk<'_> {
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
             Simd::Avx2(_) => unsafe { x86::self_avx2(self, leaves, pairs) },
-            Simd::Portable => self.leaves_with_all_behind(leaves, Node::overlapping, pairs),
+            Simd::Portable => self.leaves_with_all_behind(leaves, Node::overlapping, write_each, pairs),
         }
     }
 
@@ -67,7 +68,7 @@ impl Walk<'_> {
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
             Simd::Avx2(_) => unsafe { x86::group_avx2(self, group, pairs) },
-            Simd::Portable => self.group_with_all(group, Node::overlapping, pairs),
+            Simd::Portable => self.group_with_all(group, Node::overlapping, write_each, pairs),
         }
     }
 
@@ -76,6 +77,7 @@ impl Walk<'_> {
         &self,
         leaves: Range<usize>,
         overlapping: impl Fn(&Node, &Aabb) -> u32 + Copy,
+        write: impl Write,
         pairs: &mut Pairs,
     ) {
         for leaf in leaves {
@@ -85,12 +87,12 @@ impl Walk<'_> {
                 // Only lanes behind this one: each pair is found from its first lane.
                 let hits = overlapping(node, &node.lane(lane)) & (u32::MAX - 1) << lane;
                 if hits != 0 {
-                    add(id, ids, hits, pairs);
+                    add(id, ids, hits, write, pairs);
                 }
             }
             let bounds = self.bounds_of(leaf);
             self.each(&bounds, leaf + 1, 1, overlapping, |other| {
-                self.meet(node, &bounds, ids, other, overlapping, pairs);
+                self.meet(node, &bounds, ids, other, overlapping, write, pairs);
             });
             // A caller who wants a thousand pairs must not wait for all.
             if pairs.is_over() {
@@ -100,9 +102,15 @@ impl Walk<'_> {
     }
 
     #[inline(always)]
-    fn group_with_all(&self, group: &Group, overlapping: impl Fn(&Node, &Aabb) -> u32 + Copy, pairs: &mut Pairs) {
+    fn group_with_all(
+        &self,
+        group: &Group,
+        overlapping: impl Fn(&Node, &Aabb) -> u32 + Copy,
+        write: impl Write,
+        pairs: &mut Pairs,
+    ) {
         self.each(&group.bounds, 0, 1, overlapping, |other| {
-            self.meet(&group.node, &group.bounds, &group.ids, other, overlapping, pairs);
+            self.meet(&group.node, &group.bounds, &group.ids, other, overlapping, write, pairs);
         });
     }
 
@@ -115,6 +123,7 @@ impl Walk<'_> {
         ids: &[u32; LANES],
         leaf: usize,
         overlapping: impl Fn(&Node, &Aabb) -> u32,
+        write: impl Write,
         pairs: &mut Pairs,
     ) {
         let (node, others) = (&self.levels[0][leaf], self.ids_of(leaf));
@@ -132,7 +141,7 @@ impl Walk<'_> {
         each_bit(all, |lane| {
             let hits = overlapping(many, &few.lane(lane));
             if hits != 0 {
-                add(few_ids[lane], many_ids, hits, pairs);
+                add(few_ids[lane], many_ids, hits, write, pairs);
             }
         });
     }
@@ -197,21 +206,32 @@ impl Walk<'_> {
     }
 }
 
+/// Writes the pairs of a box with each of the others whose bit is set to the head of the room, which is for
+/// [`LANES`] pairs. The rest of the room is unspecified afterwards.
+trait Write: Fn(u32, &[u32; LANES], u32, &mut [Pair; LANES]) + Copy {}
+impl<F: Fn(u32, &[u32; LANES], u32, &mut [Pair; LANES]) + Copy> Write for F {}
+
 /// Adds the pairs of a box with each of `others` whose bit is set.
 #[inline(always)]
-fn add(id: u32, others: &[u32; LANES], hits: u32, pairs: &mut Pairs) {
-    if let Some(room) = pairs.room(LANES) {
-        let mut room = room.iter_mut();
-        each_bit(hits, |bit| {
-            let other = others[bit];
-            if let Some(pair) = room.next() {
-                *pair = (id.min(other), id.max(other));
-            }
-        });
+fn add(id: u32, others: &[u32; LANES], hits: u32, write: impl Write, pairs: &mut Pairs) {
+    if let Some(room) = pairs.room(LANES).and_then(|room| room.first_chunk_mut()) {
+        write(id, others, hits, room);
         pairs.extend_by(hits.count_ones() as usize);
     } else {
         pairs.push_mask(id, others, hits);
     }
+}
+
+/// See [`Write`].
+#[inline(always)]
+fn write_each(id: u32, others: &[u32; LANES], hits: u32, room: &mut [Pair; LANES]) {
+    let mut room = room.iter_mut();
+    each_bit(hits, |bit| {
+        let other = others[bit];
+        if let Some(pair) = room.next() {
+            *pair = (id.min(other), id.max(other));
+        }
+    });
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -219,6 +239,7 @@ mod x86 {
     use super::Walk;
     use crate::aabb::Aabb;
     use crate::cpu::kernel::node::{Group, Node};
+    use crate::cpu::kernel::x86::{write_avx2, write_avx512};
     use crate::pairs::Pairs;
     use std::arch::x86_64::*;
     use std::ops::Range;
@@ -270,22 +291,42 @@ mod x86 {
 
     #[target_feature(enable = "avx512f")]
     pub(super) fn self_avx512(walk: &Walk<'_>, leaves: Range<usize>, pairs: &mut Pairs) {
-        walk.leaves_with_all_behind(leaves, |node, b| overlapping_avx512(node, b), pairs);
+        walk.leaves_with_all_behind(
+            leaves,
+            |node, b| overlapping_avx512(node, b),
+            |i, j, hits, to| write_avx512(i, j, hits, to),
+            pairs,
+        );
     }
 
     #[target_feature(enable = "avx2")]
     pub(super) fn self_avx2(walk: &Walk<'_>, leaves: Range<usize>, pairs: &mut Pairs) {
-        walk.leaves_with_all_behind(leaves, |node, b| overlapping_avx2(node, b), pairs);
+        walk.leaves_with_all_behind(
+            leaves,
+            |node, b| overlapping_avx2(node, b),
+            |i, j, hits, to| write_avx2(i, j, hits, to),
+            pairs,
+        );
     }
 
     #[target_feature(enable = "avx512f")]
     pub(super) fn group_avx512(walk: &Walk<'_>, group: &Group, pairs: &mut Pairs) {
-        walk.group_with_all(group, |node, b| overlapping_avx512(node, b), pairs);
+        walk.group_with_all(
+            group,
+            |node, b| overlapping_avx512(node, b),
+            |i, j, hits, to| write_avx512(i, j, hits, to),
+            pairs,
+        );
     }
 
     #[target_feature(enable = "avx2")]
     pub(super) fn group_avx2(walk: &Walk<'_>, group: &Group, pairs: &mut Pairs) {
-        walk.group_with_all(group, |node, b| overlapping_avx2(node, b), pairs);
+        walk.group_with_all(
+            group,
+            |node, b| overlapping_avx2(node, b),
+            |i, j, hits, to| write_avx2(i, j, hits, to),
+            pairs,
+        );
     }
 }
 
@@ -318,6 +359,29 @@ mod tests {
                 let looked = walk.each_overlapping(simd, &query, |k| found.push(k));
                 assert_eq!(found, expected, "{simd:?}");
                 assert!(looked >= 2 && looked as usize <= 2 + 19);
+            }
+        }
+    }
+
+    #[test]
+    #[cfg(target_arch = "x86_64")]
+    fn every_level_writes_the_pairs_of_any_hits() {
+        use crate::cpu::kernel::x86::{write_avx2, write_avx512};
+        let others: [u32; LANES] = std::array::from_fn(|k| 10 * k as u32 + u32::from(k % 3 == 0) * 4_000_000_000);
+        for hits in 0..1_u32 << LANES {
+            let mut expected = [(0, 0); LANES];
+            write_each(77, &others, hits, &mut expected);
+            for simd in Simd::every() {
+                let mut written = [(0, 0); LANES];
+                match simd {
+                    // SAFETY: the proof says that this CPU has the instructions.
+                    Simd::Avx512(_) => unsafe { write_avx512(77, &others, hits, &mut written) },
+                    // SAFETY: as above.
+                    Simd::Avx2(_) => unsafe { write_avx2(77, &others, hits, &mut written) },
+                    Simd::Portable => continue,
+                }
+                let count = hits.count_ones() as usize;
+                assert_eq!(written[..count], expected[..count], "{simd:?} {hits:b}");
             }
         }
     }

@@ -115,22 +115,76 @@ impl Lanes for Avx512 {
 
     #[inline(always)]
     unsafe fn write(self, view: &View<'_>, at: usize, id: u32, hits: u32, room: &mut [Pair]) {
-        // Rust promises no layout of a tuple: this stops the build if it is another one.
-        const { assert!(size_of::<Pair>() == 8 && offset_of!(Pair, 0) == 0 && offset_of!(Pair, 1) == 4) };
-        assert!(room.len() >= Self::COUNT);
-        // SAFETY: as above for the column; `room` holds 16 pairs, which are 32 integers.
+        // SAFETY: as above for the column, of which 16 values are read.
         unsafe {
-            let all = _mm512_loadu_si512(view.ids.as_ptr().add(at).cast());
-            let others = _mm512_maskz_compress_epi32(hits as __mmask16, all);
-            let one = _mm512_set1_epi32(id as i32);
-            let (low, high) = (_mm512_min_epu32(others, one), _mm512_max_epu32(others, one));
-            let first = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
-            let second = _mm512_setr_epi32(8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
-            let to = room.as_mut_ptr().cast::<i32>();
-            _mm512_storeu_si512(to.cast(), _mm512_permutex2var_epi32(low, first, high));
-            _mm512_storeu_si512(to.add(16).cast(), _mm512_permutex2var_epi32(low, second, high));
+            let others = &*view.ids.as_ptr().add(at).cast();
+            write_avx512(id, others, hits, room.first_chunk_mut().unwrap());
         }
     }
+}
+
+// Rust promises no layout of a tuple: this stops the build if it is another one.
+const _: () = assert!(size_of::<Pair>() == 8 && offset_of!(Pair, 0) == 0 && offset_of!(Pair, 1) == 4);
+
+/// Writes the pairs of a box with each of `others` whose bit is set to the head of `room`. The rest of `room` is
+/// unspecified afterwards.
+#[target_feature(enable = "avx512f")]
+#[inline]
+pub(super) fn write_avx512(id: u32, others: &[u32; 16], hits: u32, room: &mut [Pair; 16]) {
+    let to = room.as_mut_ptr().cast::<i32>();
+    // SAFETY: there are 16 others, and `room` holds 32 integers.
+    unsafe {
+        let all = _mm512_loadu_si512(others.as_ptr().cast());
+        let others = _mm512_maskz_compress_epi32(hits as __mmask16, all);
+        let one = _mm512_set1_epi32(id as i32);
+        let (low, high) = (_mm512_min_epu32(others, one), _mm512_max_epu32(others, one));
+        let first = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+        let second = _mm512_setr_epi32(8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
+        _mm512_storeu_si512(to.cast(), _mm512_permutex2var_epi32(low, first, high));
+        _mm512_storeu_si512(to.add(16).cast(), _mm512_permutex2var_epi32(low, second, high));
+    }
+}
+
+/// For each mask of eight lanes: the numbers of its lanes, one a byte, then zeros.
+static LANES_OF: [u64; 256] = {
+    let mut table = [0; 256];
+    let mut mask = 0;
+    while mask < 256 {
+        let (mut lane, mut count) = (0, 0);
+        while lane < 8 {
+            if mask >> lane & 1 == 1 {
+                table[mask] |= lane << (8 * count);
+                count += 1;
+            }
+            lane += 1;
+        }
+        mask += 1;
+    }
+    table
+};
+
+/// As [`write_avx512`].
+#[target_feature(enable = "avx2")]
+#[inline]
+pub(super) fn write_avx2(id: u32, others: &[u32; 16], hits: u32, room: &mut [Pair; 16]) {
+    let one = _mm256_set1_epi32(id as i32);
+    let mut half = |k: usize, at: usize| {
+        // SAFETY: there are eight others from `8 k` on. At most `8 k` pairs stand before `at`, and eight are written,
+        // so that `room` holds them.
+        unsafe {
+            let lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(LANES_OF[(hits >> (8 * k)) as usize & 255] as i64));
+            let all = _mm256_loadu_si256(others.as_ptr().add(8 * k).cast());
+            let others = _mm256_permutevar8x32_epi32(all, lanes);
+            let (low, high) = (_mm256_min_epu32(others, one), _mm256_max_epu32(others, one));
+            // Pairs 0, 1, 4, 5 and 2, 3, 6, 7.
+            let (a, b) = (_mm256_unpacklo_epi32(low, high), _mm256_unpackhi_epi32(low, high));
+            let to = room.as_mut_ptr().add(at);
+            _mm256_storeu_si256(to.cast(), _mm256_permute2x128_si256::<0x20>(a, b));
+            _mm256_storeu_si256(to.add(4).cast(), _mm256_permute2x128_si256::<0x31>(a, b));
+        }
+    };
+    half(0, 0);
+    half(1, (hits & 255).count_ones() as usize);
 }
 
 #[target_feature(enable = "avx2")]
