@@ -3,8 +3,8 @@
 //!
 //! While every box stays within its grown box, every overlapping pair is among the pairs of grown boxes. So a frame
 //! costs one test of each box and one of each kept pair. A box that leaves its grown box gets a new one, and a tree of
-//! the grown boxes finds its new neighbours. After many of these, tree and list are rebuilt. If the boxes move too far
-//! for that to pay, a tree of the boxes themselves finds the pairs, until the boxes slow down.
+//! the grown boxes finds its new neighbours. After many of these, tree and list are rebuilt. If that takes longer than to find
+//! all pairs with a tree of the boxes themselves, by the clock, such a tree finds them until the boxes slow down.
 //!
 //! Verlet (Phys. Rev. 159, 1967) kept such lists of neighbours for molecules.
 

@@ -2,7 +2,7 @@
 //!
 //! Sixteen boxes that are near in space share a leaf, sixteen leaves a node, and so on. One test compares a box with
 //! all 16. Dense places don't matter: if more than two leaves of boxes share a cell of the curve, a finer curve orders
-//! them.
+//! them. Nor do boxes as long as the world: the order has a part for each shape of oversized boxes. See [`curve`].
 
 mod curve;
 mod upkeep;
