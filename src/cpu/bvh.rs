@@ -68,7 +68,7 @@ mod tests {
     fn pairs_are_right_in_every_frame_of_churn() {
         let threads = if cfg!(feature = "parallel") { 3 } else { 1 };
         let mut methods: Vec<_> =
-            Simd::every().map(|simd| create(threads, &Threads::default(), simd).unwrap()).into_iter().collect();
+            Simd::every().map(|simd| create(threads, &Threads::default(), simd).unwrap()).collect();
         let mut random = 0;
         let mut below = |n: u64| {
             random += 1;

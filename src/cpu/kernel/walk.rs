@@ -92,7 +92,7 @@ impl Walk<'_> {
             }
             let bounds = self.bounds_of(leaf);
             self.each(&bounds, leaf + 1, 1, overlapping, |other| {
-                self.meet(node, &bounds, ids, other, overlapping, write, pairs);
+                self.meet((node, &bounds, ids), other, overlapping, write, pairs);
             });
             // A caller who wants a thousand pairs must not wait for all.
             if pairs.is_over() {
@@ -110,17 +110,15 @@ impl Walk<'_> {
         pairs: &mut Pairs,
     ) {
         self.each(&group.bounds, 0, 1, overlapping, |other| {
-            self.meet(&group.node, &group.bounds, &group.ids, other, overlapping, write, pairs);
+            self.meet((&group.node, &group.bounds, &group.ids), other, overlapping, write, pairs);
         });
     }
 
-    /// Adds the pairs of the boxes of a node, which has these bounds, with those of a leaf.
+    /// Adds the pairs of the boxes of a node, given with its bounds and ids, with those of a leaf.
     #[inline(always)]
     fn meet(
         &self,
-        boxes: &Node,
-        bounds: &Aabb,
-        ids: &[u32; LANES],
+        (boxes, bounds, ids): (&Node, &Aabb, &[u32; LANES]),
         leaf: usize,
         overlapping: impl Fn(&Node, &Aabb) -> u32,
         write: impl Write,

@@ -102,8 +102,8 @@ impl Curve {
     /// Makes a curve through a range of these lengths, for boxes of this usual extent.
     fn through([x, y, z]: [f32; 3], lengths: [f32; 3], extent: [f32; 3], boxes: usize) -> Self {
         let longest = extent.into_iter().fold(0.0, f32::max);
-        // The cell's edge on each axis over its longest edge. NaN, of 0 over 0, becomes 1.
-        let shape = extent.map(|e| (e / longest).min(1.0).max(1.0 / FLATTEST));
+        // The cell's edge on each axis over its longest edge.
+        let shape = extent.map(|e| if longest > 0.0 { (e / longest).clamp(1.0 / FLATTEST, 1.0) } else { 1.0 });
         let mut cells = [0, 1, 2].map(|a| (a, lengths[a] / shape[a]));
         cells.sort_by(|a, b| b.1.total_cmp(&a.1));
         let [(finest, most), (_, second), _] = cells;
@@ -297,7 +297,7 @@ static HILBERT: [u16; STATES * LOOKED_UP] = {
 /// plus the direction.
 const fn hilbert_step(state: usize, octant: usize) -> (usize, usize) {
     const fn rotated(corner: usize, by: usize) -> usize {
-        (corner << by % 3 | corner >> (3 - by % 3)) & 7
+        (corner << (by % 3) | corner >> (3 - by % 3)) & 7
     }
     let (entry, direction) = (state / 3, state % 3);
     let gray = rotated(octant ^ entry, 2 - direction);
@@ -306,7 +306,8 @@ const fn hilbert_step(state: usize, octant: usize) -> (usize, usize) {
         return (rank, entry * 3 + (direction + 1) % 3);
     }
     let even = (rank - 1) & !1;
-    let turn = if rank % 2 == 0 { (!(rank - 1)).trailing_zeros() } else { (!rank).trailing_zeros() } as usize % 3;
+    let turn =
+        if rank.is_multiple_of(2) { (!(rank - 1)).trailing_zeros() } else { (!rank).trailing_zeros() } as usize % 3;
     (rank, (entry ^ rotated(even ^ even >> 1, direction + 1)) * 3 + (direction + 1 + turn) % 3)
 }
 
