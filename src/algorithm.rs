@@ -3,7 +3,7 @@
 pub use crate::broad_phase::{FrameKind, FrameWork};
 pub use crate::cpu::{SimdLevel, SimdLevelError};
 pub use crate::entry::Entry;
-pub use crate::load::{Displacement, FramePlan, Load};
+pub use crate::load::{Displacement, FramePlan, Load, Motion};
 pub use crate::registry::{AlgorithmSource, usable_cores};
 
 use std::fmt;

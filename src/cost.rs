@@ -31,7 +31,7 @@ pub struct CostCurve {
     /// Effect of several threads; `None` for one thread and for GPUs.
     pub helpers: Option<Helpers>,
     /// Correction of that: what a prediction leaves unexplained on several threads, and what frames that ran showed.
-    pub observed: Option<Residual>,
+    pub residual: Option<Residual>,
 }
 
 /// The cost of a method on one thread of a machine or on some of its GPUs: a sum of terms times the exponential of a
@@ -216,10 +216,10 @@ impl CostCurve {
         Self { helpers: Some(helpers), ..self }
     }
 
-    /// Sets the correction from frames that ran.
+    /// Sets the correction of the whole.
     #[must_use]
-    pub fn with_observed(self, observed: Residual) -> Self {
-        Self { observed: Some(observed), ..self }
+    pub fn with_residual(self, residual: Residual) -> Self {
+        Self { residual: Some(residual), ..self }
     }
 
     /// Returns the cost on one thread or on GPUs, to be changed for this algorithm alone.
@@ -234,7 +234,7 @@ impl CostCurve {
     }
 
     pub(crate) fn cost_of<'a>(&'a self, frame: &Frame<'a>) -> f64 {
-        self.on_helpers(frame.work(&self.work).ns, frame) * frame.factor(self.observed.as_ref())
+        self.on_helpers(frame.work(&self.work).ns, frame) * frame.factor(self.residual.as_ref())
     }
 
     /// The cost on several threads of work that takes this long on one.
@@ -245,7 +245,7 @@ impl CostCurve {
     /// Returns the cost, its part that is due to calls, and the cost with the fallback.
     pub(crate) fn parts_of<'a>(&'a self, frame: &Frame<'a>) -> FrameCost {
         let work = frame.work(&self.work);
-        let observed = frame.factor(self.observed.as_ref());
+        let correction = frame.factor(self.residual.as_ref());
         let calls_ns = match self.helpers {
             Some(helpers) => helpers.calls_ns(frame.load.objects, work.ns),
             None => {
@@ -255,9 +255,9 @@ impl CostCurve {
         };
         let fallback_ns = |f: &'a Fallback| self.on_helpers(f.factor * frame.work(&f.work).ns * work.factor, frame);
         FrameCost {
-            ns: self.on_helpers(work.ns, frame) * observed,
-            fallback_ns: self.work.fallback.as_ref().map(|f| fallback_ns(f) * observed),
-            calls_ns: calls_ns * observed,
+            ns: self.on_helpers(work.ns, frame) * correction,
+            fallback_ns: self.work.fallback.as_ref().map(|f| fallback_ns(f) * correction),
+            calls_ns: calls_ns * correction,
         }
     }
 
@@ -284,7 +284,7 @@ impl CostCurve {
         if self.helpers.is_some_and(|h| !h.is_sound()) {
             return Some(CurveError::Helpers);
         }
-        self.observed.as_ref().is_some_and(|r| !r.is_sound()).then_some(CurveError::Residual)
+        self.residual.as_ref().is_some_and(|r| !r.is_sound()).then_some(CurveError::Residual)
     }
 }
 
@@ -305,7 +305,7 @@ mod tests {
         let mut with = curve.clone();
         with.work_mut().residual = Some(residual.clone());
         assert!((with.cost_ns(&load(16)) / curve.cost_ns(&load(16)) - 2.0).abs() < 1e-9);
-        let with = with.with_observed(residual.with_constant(3.0_f64.ln()));
+        let with = with.with_residual(residual.with_constant(3.0_f64.ln()));
         assert!((with.cost_ns(&load(16)) / curve.cost_ns(&load(16)) - 12.0).abs() < 1e-9);
         assert_eq!(with.defect(), None);
     }
@@ -351,9 +351,9 @@ mod tests {
         let curve = |unit_ns| CostCurve::new(vec![CostTerm::new(Term::Call, unit_ns)]);
         let places = Arc::new(Places::new(vec![load(16)]));
         let residual = |weights: &[f64]| Residual::new(Arc::clone(&places), weights.to_vec(), false);
-        assert_eq!(curve(1.0).with_observed(residual(&[0.1])).defect(), None);
+        assert_eq!(curve(1.0).with_residual(residual(&[0.1])).defect(), None);
         for wrong in [&[f64::NAN][..], &[1e9], &[0.1, 0.1]] {
-            assert_eq!(curve(1.0).with_observed(residual(wrong)).defect(), Some(CurveError::Residual), "{wrong:?}");
+            assert_eq!(curve(1.0).with_residual(residual(wrong)).defect(), Some(CurveError::Residual), "{wrong:?}");
         }
         assert_eq!(curve(1.0).with_helpers(Helpers::new(1)).defect(), Some(CurveError::Helpers));
         let powers = CostCurve::new(vec![CostTerm::new(Term::Product(Product::ONE.pairs(9)), 1.0)]);

@@ -8,7 +8,7 @@ mod strip_grid;
 
 use crate::aabb::Aabb;
 
-pub use displacement::Displacement;
+pub use displacement::{Displacement, Motion};
 pub(crate) use displacement::{is_same_pace, paces_apart_ln};
 pub use plan::FramePlan;
 pub use sampled_boxes::SampledBoxes;
@@ -33,10 +33,13 @@ pub struct Load {
     pub strip_candidates: f64,
     /// Overlapping pairs: those of the previous frame, or an estimate from the sample if there is none.
     pub pairs: f64,
-    /// Motion in a frame, 0 to 1, as [`Displacement::moved`](crate::algorithm::Displacement::moved) returns it: the
+    /// Motion in a frame, 0 to 1, as [`Displacement::motion`](crate::algorithm::Displacement::motion) returns it: the
     /// mean over a sample of the greatest displacement of a bound since the previous frame, in mean edges of the box,
     /// at most 1 each. 0: nothing moves. 1: no frame helps with the next, or the previous frame is unknown.
     pub moved: f64,
+    /// Share of the boxes of that sample that moved by more than a tenth of a mean edge, 0 to 1. 1 if the previous
+    /// frame is unknown.
+    pub moved_share: f64,
 }
 
 impl Load {
@@ -47,13 +50,15 @@ impl Load {
     }
 
     /// Returns whether a frame of another load takes about as long. Each count may differ by `share` of itself plus
-    /// `share` of the objects, because a box takes as long as some pairs.
+    /// `share` of the objects, because a box takes as long as some pairs; the share of moved boxes by `share` of all.
     pub fn is_within(&self, share: f64, other: &Self) -> bool {
         let objects = f64::from(self.objects);
         let counts = |l: &Self| [f64::from(l.objects), l.axis_candidates, l.strip_candidates, l.pairs];
         // False for NaN.
         let near = |(a, b): (f64, f64)| (a - b).abs() <= share * (a + objects);
-        counts(self).into_iter().zip(counts(other)).all(near) && (self.moved - other.moved).abs() <= share * self.moved
+        counts(self).into_iter().zip(counts(other)).all(near)
+            && (self.moved - other.moved).abs() <= share * self.moved
+            && (self.moved_share - other.moved_share).abs() <= share
     }
 
     /// Returns the load with this many overlapping pairs.
@@ -69,29 +74,39 @@ impl Load {
         Self { axis_candidates: axis, strip_candidates: strip, ..self }
     }
 
-    /// Returns the load with this motion.
+    /// Returns the load with this [motion](Self::moved).
     #[must_use]
     pub fn with_moved(self, moved: f64) -> Self {
         Self { moved, ..self }
     }
 
+    /// Returns the load with this [share of moved boxes](Self::moved_share).
+    #[must_use]
+    pub fn with_moved_share(self, moved_share: f64) -> Self {
+        Self { moved_share, ..self }
+    }
+
+    pub(crate) fn with_motion(self, Motion { moved, moved_share }: Motion) -> Self {
+        Self { moved, moved_share, ..self }
+    }
+
     /// Returns whether every number is finite and none is negative.
     #[must_use]
     pub fn is_sound(&self) -> bool {
-        [self.axis_candidates, self.strip_candidates, self.pairs, self.moved].iter().all(|v| v.is_finite() && *v >= 0.0)
+        let Self { objects: _, axis_candidates, strip_candidates, pairs, moved, moved_share } = *self;
+        [axis_candidates, strip_candidates, pairs, moved, moved_share].iter().all(|v| v.is_finite() && *v >= 0.0)
     }
 
     /// Estimates the load of a frame from up to 256 of its boxes, in a time that is constant above 16 000 boxes.
     ///
-    /// `pairs` is the number of pairs of the previous frame, and `moved` the motion since; both `None` if there was
-    /// none.
+    /// `pairs` is the number of pairs of the previous frame, and `motion` that since; both `None` if there was none.
     #[must_use]
-    pub fn estimate(boxes: &[Aabb], pairs: Option<f64>, moved: Option<f64>) -> Self {
-        Self::planned(boxes, pairs, moved).0
+    pub fn estimate(boxes: &[Aabb], pairs: Option<f64>, motion: Option<Motion>) -> Self {
+        Self::planned(boxes, pairs, motion).0
     }
 
     /// Estimates the load and the plan of a frame from the same sample.
-    pub fn planned(boxes: &[Aabb], pairs: Option<f64>, moved: Option<f64>) -> (Self, FramePlan) {
+    pub fn planned(boxes: &[Aabb], pairs: Option<f64>, motion: Option<Motion>) -> (Self, FramePlan) {
         let sample = SampledBoxes::from(boxes);
         let (plan, stats, grid) = FramePlan::of_sample(&sample, boxes.len());
         let n = boxes.len() as f64;
@@ -107,10 +122,11 @@ impl Load {
             strip_share(&sample, &grid, shares[axis], pairs / independent.max(1.0)) * all
         };
         let strip_candidates = strip_candidates.max(pairs).min(axis_candidates.max(pairs));
-        (
-            Self { objects: boxes.len() as u32, axis_candidates, strip_candidates, pairs, moved: moved.unwrap_or(1.0) },
-            plan,
-        )
+        let load = Self::of_objects(boxes.len() as u32)
+            .with_candidates(axis_candidates, strip_candidates)
+            .with_pairs(pairs)
+            .with_motion(motion.unwrap_or(Motion::MOST));
+        (load, plan)
     }
 
     /// Returns the load of a similar frame with another number of objects and pairs.
@@ -119,7 +135,7 @@ impl Load {
         let growth = if self.objects > 0 { f64::from(objects) / f64::from(self.objects) } else { 1.0 };
         let axis_candidates = self.axis_candidates * growth * growth;
         let strip_candidates = (self.strip_candidates * growth).min(axis_candidates);
-        Self { objects, axis_candidates, strip_candidates, pairs, moved: self.moved }
+        Self { objects, axis_candidates, strip_candidates, pairs, ..*self }
     }
 }
 

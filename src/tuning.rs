@@ -133,7 +133,7 @@ impl AlgorithmCost {
     /// Its residuals: of the work, of its fallback, and of what frames have shown.
     pub(crate) fn residuals(&self) -> impl Iterator<Item = &Residual> {
         let fallback = self.curve.work.fallback.iter().filter_map(|f| f.work.residual.as_ref());
-        self.curve.work.residual.iter().chain(&self.curve.observed).chain(fallback)
+        self.curve.work.residual.iter().chain(&self.curve.residual).chain(fallback)
     }
 }
 

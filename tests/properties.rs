@@ -88,8 +88,10 @@ proptest! {
         displacement.watch(&boxes);
         let reversed: Vec<Aabb> = boxes.iter().rev().copied().collect();
         for (now, most) in [(&boxes, 0.0), (&reversed, 1.0)] {
-            let moved = displacement.moved(now).unwrap_or(0.0);
+            let motion = displacement.motion(now);
+            let (moved, share) = motion.map_or((0.0, 0.0), |m| (m.moved, m.moved_share));
             prop_assert!((0.0..=most).contains(&moved), "{}", moved);
+            prop_assert!((0.0..=most.ceil()).contains(&share), "{}", share);
         }
     }
 

@@ -34,7 +34,7 @@ static PREDICTED: LazyLock<Tuning> = LazyLock::new(|| {
 /// The report in the tests is damaged.
 #[must_use]
 pub fn hardware() -> Hardware {
-    sapwise_lab::report::read(include_str!("../../crates/lab/tests/fixtures/report-2.json")).unwrap().value.hardware
+    sapwise_lab::report::read(include_str!("../../crates/lab/tests/fixtures/report-3.json")).unwrap().value.hardware
 }
 
 /// Algorithms with their names.

@@ -88,8 +88,8 @@ const NAMES: [&str; 14] = [
     "cpu",
     "gpu",
     "uniform",
-    "tuning/2",
-    "tuning/2.7",
-    "model/4",
-    "report/2",
+    "tuning/3",
+    "tuning/3.7",
+    "model/5",
+    "report/3",
 ];

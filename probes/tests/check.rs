@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 fn report() -> Value {
     let samples = |ns: u64| json!([ns, ns + 1, ns + 2]);
     json!({
-        "schema": "report/2",
+        "schema": "report/3",
         "label": "real_full",
         "provenance": {
             "version": "0.1.0", "date": "2026-01-01", "command": "probe --seed 1", "seed": 1, "threads": null,
@@ -30,7 +30,8 @@ fn report() -> Value {
         "algorithms": [{"id": "brute@cpu1", "revision": revision()}, {"id": "brute@cpu64", "revision": revision()}],
         "points": [{
             "scenario": "uniform",
-            "load": {"objects": 10, "axis_candidates": 4.0, "strip_candidates": 4.0, "pairs": 2.0, "moved": 1.0},
+            "load": {"objects": 10, "axis_candidates": 4.0, "strip_candidates": 4.0, "pairs": 2.0, "moved": 1.0,
+                "moved_share": 1.0},
             "pairs": 2, "fingerprint": "00000000000000ff", "foreign_load": null, "spoiled": 0,
             "timings": [
                 {"algorithm": "brute@cpu1", "samples_ns": samples(100), "error": null},
@@ -49,7 +50,7 @@ fn revision() -> u32 {
 
 fn tuning(steps: &Value) -> Value {
     json!({
-        "schema": "tuning/2", "source": "default", "model": null, "extrapolated": false, "warnings": [],
+        "schema": "tuning/3", "source": "default", "model": null, "extrapolated": false, "warnings": [],
         "scenario": "uniform", "steps": steps, "crossovers": [], "interval_basis": "", "costs": []
     })
 }
@@ -82,8 +83,8 @@ fn sound_files_pass() {
     let (status, findings) = check(&[report, tuning]);
     assert_eq!(status, 0, "{findings:?}");
     assert!(findings.iter().all(|f| f["sound"] == true && f["current"] == true), "{findings:?}");
-    assert_eq!((&findings[0]["schema"], &findings[0]["applicable"]), (&"report/2".into(), &false.into()));
-    assert_eq!((&findings[1]["schema"], &findings[1]["applicable"]), (&"tuning/2".into(), &true.into()));
+    assert_eq!((&findings[0]["schema"], &findings[0]["applicable"]), (&"report/3".into(), &false.into()));
+    assert_eq!((&findings[1]["schema"], &findings[1]["applicable"]), (&"tuning/3".into(), &true.into()));
     assert!(findings[0]["notes"].to_string().contains("measured on another machine: none"), "{findings:?}");
 }
 
@@ -131,7 +132,7 @@ fn damaged_files_are_named_with_the_place_and_hide_no_others() {
         (path("empty.json", b""), "line 1 column 0"),
         (path("future.json", with("/schema", "report/3".into()).as_bytes()), "report/3"),
         (path("nested.json", nested.as_bytes()), "line 1 column"),
-        (path("deep.json", format!("{{\"schema\": \"report/2\", \"x\": {nested}}}").as_bytes()), "x is no key"),
+        (path("deep.json", format!("{{\"schema\": \"report/3\", \"x\": {nested}}}").as_bytes()), "x is no key"),
         (path("unknown.json", good.replacen("\"label\"", "\"lable\"", 1).as_bytes()), "lable"),
         (path("zero.json", with("/points/0/timings/0/samples_ns/0", 0.into()).as_bytes()), "0 ns"),
         (path("negative.json", with("/points/0/load/pairs", (-1.0).into()).as_bytes()), "negative"),
@@ -391,19 +392,19 @@ fn the_published_cards_are_sound_and_told_to_be_published() {
 fn keys_of_a_newer_version_are_ignored_and_told_once_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let mut newer = measured();
-    newer["schema"] = "report/2.9".into();
+    newer["schema"] = "report/3.9".into();
     newer["weather"] = "rain".into();
     for point in newer["points"].as_array_mut().unwrap() {
         point["load"]["depth"] = 3.into();
     }
     let newer = write(folder.path(), "newer.json", newer.to_string());
-    let sentence = "newer.json is of report/2.9, which a newer version of sapwise wrote; ignored, because this version \
+    let sentence = "newer.json is of report/3.9, which a newer version of sapwise wrote; ignored, because this version \
                     does not know it: points[].load.depth, weather";
     let (status, findings) = check(std::slice::from_ref(&newer));
     assert!(status == 0 && findings[0]["notes"].to_string().contains(sentence), "{findings:?}");
     let out = folder.path().join("tuning.json");
     let mut steps = tuning(&json!([{"from_objects": 0, "algorithm": "brute@cpu1"}]));
-    steps["schema"] = "tuning/2.1".into();
+    steps["schema"] = "tuning/3.1".into();
     steps["mood"] = "good".into();
     let steps = write(folder.path(), "newer-tuning.json", steps.to_string());
     let complaints = |words: &[&str], file: &Path| {
@@ -417,5 +418,5 @@ fn keys_of_a_newer_version_are_ignored_and_told_once_a_file() {
         assert!(matches!(&told[..], [one] if one.ends_with(sentence)), "{told:?}");
     }
     let told = complaints(&replayed, &steps);
-    assert!(matches!(&told[..], [one] if one.contains("is of tuning/2.1") && one.ends_with(": mood")), "{told:?}");
+    assert!(matches!(&told[..], [one] if one.contains("is of tuning/3.1") && one.ends_with(": mood")), "{told:?}");
 }

@@ -199,7 +199,7 @@ fn schema_writes_a_file_for_every_kind() {
     let told = success(sapwise().args(["schema", "--json", "--out"]).arg(folder.path().join("new")));
     let told: serde_json::Value = serde_json::from_str(&told).unwrap();
     assert_eq!(told["files"].as_array().unwrap().len(), 3);
-    for name in ["report-2", "model-4", "tuning-2"] {
+    for name in ["report-3", "model-5", "tuning-3"] {
         let text = fs::read_to_string(folder.path().join("new").join(format!("{name}.schema.json"))).unwrap();
         let schema: serde_json::Value = serde_json::from_str(&text).unwrap();
         assert!(schema["properties"]["schema"].is_object() || schema["$defs"].is_object(), "{text}");

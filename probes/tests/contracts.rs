@@ -31,7 +31,7 @@ fn assert_keys(value: &Value, keys: &[&str]) {
 fn assert_tuning(tuning: &Value, source: &str) {
     assert_keys(tuning, &["schema", "source", "extrapolated", "warnings", "scenario", "steps", "crossovers", "costs"]);
     assert!(tuning.get("model").is_some());
-    assert_eq!((&tuning["schema"], &tuning["source"]), (&"tuning/2".into(), &source.into()));
+    assert_eq!((&tuning["schema"], &tuning["source"]), (&"tuning/3".into(), &source.into()));
     assert_eq!((&tuning["scenario"], &tuning["steps"][0]["from_objects"]), (&"uniform".into(), &0.into()));
     tuning["steps"].as_array().unwrap().iter().for_each(|step| assert_keys(step, &["from_objects", "algorithm"]));
     let crossovers = tuning["crossovers"].as_array().unwrap();

@@ -25,7 +25,7 @@ fn report(command: &mut assert_cmd::Command) -> sapwise_lab::Report {
 /// A made-up report of a machine with two GPUs, with what `change` does to it. Enough points for a model.
 fn made_up(folder: &Path, name: &str, change: impl Fn(&mut Value)) -> PathBuf {
     let mut report: Value =
-        serde_json::from_str(include_str!("../../crates/lab/tests/fixtures/report-2-gpu.json")).unwrap();
+        serde_json::from_str(include_str!("../../crates/lab/tests/fixtures/report-3-gpu.json")).unwrap();
     report["label"] = "real_full".into();
     // The fixture is old; this is a report of this build.
     let registry = sapwise::Registry::with_cores(1);
@@ -179,7 +179,7 @@ fn tuning_for_a_missing_gpu_is_run_on_the_rest() {
     let folder = tempfile::tempdir().unwrap();
     let step = |from: u32, id: &str| json!({"from_objects": from, "algorithm": id});
     let tuning = json!({
-        "schema": "tuning/2", "source": "default", "model": null, "extrapolated": false,
+        "schema": "tuning/3", "source": "default", "model": null, "extrapolated": false,
         "warnings": [], "scenario": "uniform",
         "steps": [step(0, "brute@cpu1"), step(100, "grid-sap@gpu99")],
         "crossovers": [], "interval_basis": "", "costs": []

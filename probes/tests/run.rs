@@ -17,7 +17,7 @@ fn answer(command: &mut assert_cmd::Command) -> Value {
 fn steps(folder: &Path, first: &str, crossover: u32, second: &str) -> PathBuf {
     let step = |from: u32, id: &str| json!({"from_objects": from, "algorithm": id});
     let tuning = json!({
-        "schema": "tuning/2", "source": "default", "model": null, "extrapolated": false,
+        "schema": "tuning/3", "source": "default", "model": null, "extrapolated": false,
         "warnings": [], "scenario": "uniform",
         "steps": [step(0, first), step(crossover, second)], "crossovers": [], "interval_basis": "", "costs": []
     });
@@ -32,10 +32,10 @@ fn costs(folder: &Path, threads: u32) -> PathBuf {
     let devices: Value = answer(sapwise().args(["devices", "--no-gpus", "--json"]));
     let own = devices["algorithms"].as_array().unwrap().iter().find(|a| a["id"] == "grid-sap@cpu1").unwrap();
     let mut fixture: Value =
-        serde_json::from_str(include_str!("../../crates/tune/tests/fixtures/tuning-2.json")).unwrap();
+        serde_json::from_str(include_str!("../../crates/tune/tests/fixtures/tuning-3.json")).unwrap();
     let cost = |id: &str| {
         json!({
-            "algorithm": id, "revision": own["revision"], "work": 0, "helpers": null, "observed": null, "spread_ln": 0.1
+            "algorithm": id, "revision": own["revision"], "work": 0, "helpers": null, "residual": null, "spread_ln": 0.1
         })
     };
     fixture["costs"] = json!([cost(&one), cost(&many)]);

@@ -49,7 +49,7 @@ pub(super) struct LoadTracker {
 impl LoadTracker {
     /// How far the boxes move in a frame, in edges, where that was found out.
     pub(super) fn moved(&self) -> Option<f64> {
-        self.motion.moved()
+        self.motion.motion().map(|m| m.moved)
     }
 
     /// The load that was estimated last.
@@ -72,12 +72,12 @@ impl LoadTracker {
         let objects = count(boxes);
         let pairs = self.before.map(|(n, pairs)| scaled(pairs as f64, objects, n));
         self.look(boxes);
-        let moved = self.motion.moved();
+        let motion = self.motion.motion();
         self.sampled_ns = 0.0;
         let mut plan = FramePlan::default();
         if self.is_sample_due(objects) {
             let started = Instant::now();
-            (self.load, plan) = Load::planned(boxes, pairs, moved);
+            (self.load, plan) = Load::planned(boxes, pairs, motion);
             #[cfg(test)]
             counted::spend(counted::sample_ns(boxes.len()));
             let took = started.elapsed().as_nanos() as f64;
@@ -87,9 +87,9 @@ impl LoadTracker {
             (self.sampled, self.age, self.passed_ns) = (objects, 0, 0.0);
         } else {
             self.load = self.load.rescaled(objects, pairs.unwrap_or(self.load.pairs));
-            self.load.moved = moved.unwrap_or(self.load.moved);
+            self.load = motion.map_or(self.load, |motion| self.load.with_motion(motion));
         }
-        self.plan = plan.with_moved(moved).with_pairs(pairs);
+        self.plan = plan.with_moved(self.moved()).with_pairs(pairs);
         self.throttle.decide(objects);
     }
 

@@ -7,7 +7,7 @@ use crate::aabb::Aabb;
 use crate::clock::Instant;
 #[cfg(test)]
 use crate::clock::counted;
-use crate::load::{Displacement, is_same_pace};
+use crate::load::{Displacement, Motion, is_same_pace};
 
 /// Share of the frames' time for looking how far boxes move.
 const SHARE: f64 = 0.002;
@@ -21,7 +21,7 @@ pub(super) struct MotionWatch {
     displacement: Displacement,
     state: State,
     /// How far the boxes moved when that was last found out.
-    moved: Option<f64>,
+    motion: Option<Motion>,
     /// What a look takes, and the time of the frames since the last one, in nanoseconds.
     look_ns: f64,
     passed_ns: f64,
@@ -39,27 +39,27 @@ enum State {
 }
 
 impl MotionWatch {
-    /// How far the boxes move in a frame, in edges, where that was found out.
-    pub(super) fn moved(&self) -> Option<f64> {
-        self.moved
+    /// How far the boxes move in a frame, where that was found out.
+    pub(super) fn motion(&self) -> Option<Motion> {
+        self.motion
     }
 
     /// Compares the boxes of a frame with those of the frame before, which are [remembered](Self::ran). Whether they
     /// move at another pace than when this was looked at last.
     pub(super) fn look(&mut self, boxes: &[Aabb]) -> bool {
         let started = Instant::now();
-        let moved = self.displacement.moved(boxes);
+        let motion = self.displacement.motion(boxes);
         #[cfg(test)]
         counted::spend(counted::LOOK_NS);
         // To remember the boxes takes about as long as to compare them.
-        self.found(moved, 2.0 * started.elapsed().as_nanos() as f64)
+        self.found(motion, 2.0 * started.elapsed().as_nanos() as f64)
     }
 
     /// Takes in what a look has found, and how long it took. Whether that is another pace.
-    fn found(&mut self, moved: Option<f64>, took_ns: f64) -> bool {
-        let as_before = self.moved.zip(moved).is_some_and(|(before, now)| is_same_pace(before, now));
+    fn found(&mut self, motion: Option<Motion>, took_ns: f64) -> bool {
+        let as_before = self.motion.zip(motion).is_some_and(|(before, now)| is_same_pace(before.moved, now.moved));
         self.look_ns = if self.look_ns > 0.0 { took_ns.min(self.look_ns * COST_RISES) } else { took_ns };
-        (self.moved, self.passed_ns, self.state) = (moved, 0.0, State::Resting);
+        (self.motion, self.passed_ns, self.state) = (motion, 0.0, State::Resting);
         !as_before
     }
 
@@ -99,6 +99,6 @@ impl MotionWatch {
 
     /// After a frame that failed nothing is known of the one before.
     pub(super) fn failed(&mut self) {
-        (self.moved, self.state) = (None, State::Resting);
+        (self.motion, self.state) = (None, State::Resting);
     }
 }

@@ -26,6 +26,8 @@ pub enum Term {
     Pairs,
     /// Boxes times how far they move ([`Load::moved`]), for boxes that leave their fat boxes.
     Moved,
+    /// Boxes that move by more than a tenth of an edge ([`Load::moved_share`] of all), for the same.
+    MovedShare,
     /// A count of a program's own algorithm.
     Product(Product),
 }
@@ -169,6 +171,7 @@ impl<'a> Counts<'a> {
             Term::StripCandidates => self.load.strip_candidates,
             Term::Pairs => self.load.pairs,
             Term::Moved => n * self.load.moved,
+            Term::MovedShare => n * self.load.moved_share,
             Term::Product(product) => product.of(self),
         }
     }
@@ -189,11 +192,12 @@ mod tests {
     fn a_scene_at_rest_has_no_moved_boxes() {
         let load = |moved| Load { objects: 200, moved, ..Load::default() };
         assert_eq!([0.0, 0.25, 1.0].map(|moved| Term::Moved.count(&load(moved), 0.0)), [0.0, 50.0, 200.0]);
+        assert_eq!(Term::MovedShare.count(&load(0.25).with_moved_share(0.5), 0.0), 100.0);
     }
 
     #[test]
     fn products_by_hand() {
-        let load = Load { objects: 8, pairs: 5.0, axis_candidates: 3.0, strip_candidates: 2.0, moved: 0.5 };
+        let load = Load::of_objects(8).with_pairs(5.0).with_candidates(3.0, 2.0).with_moved(0.5);
         let count = |product: Product| Term::Product(product).count(&load, 0.0);
         assert_eq!(count(Product::ONE), 1.0);
         assert_eq!(count(Product::ONE.objects(1).log2_objects(1)), Term::Sort.count(&load, 0.0));

@@ -21,9 +21,27 @@ pub(crate) fn paces_apart_ln(one: f64, other: f64) -> f64 {
 /// Speeds closer than this may be the same: few boxes are watched.
 const SAME_PACE_LN: f64 = 0.25;
 
-/// Returns whether two results of [`Displacement::moved`] may stand for the same speed.
+/// Returns whether two values of [`Motion::moved`] may stand for the same speed.
 pub(crate) fn is_same_pace(one: f64, other: f64) -> bool {
     paces_apart_ln(one, other) < SAME_PACE_LN
+}
+
+/// Share of its mean edge by which a box moves at least to count in [`Motion::moved_share`].
+const FAR: f32 = 0.1;
+
+/// How far boxes move in a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Motion {
+    /// Mean over a sample of the greatest displacement of a bound since the previous frame, in mean edges of the box,
+    /// at most 1 each.
+    pub moved: f64,
+    /// Share of the sample that moved by more than a tenth of a mean edge, 0 to 1.
+    pub moved_share: f64,
+}
+
+impl Motion {
+    /// The motion if no frame helps with the next.
+    pub(crate) const MOST: Self = Self { moved: 1.0, moved_share: 1.0 };
 }
 
 /// The positions of a few boxes in the previous frame.
@@ -59,13 +77,12 @@ impl Displacement {
         }
     }
 
-    /// Returns the motion of the watched boxes since, 0 to 1: the mean over them of the greatest displacement of a
-    /// bound, in mean edges of the box, at most 1 each. `None` if no watched box is valid and still there.
+    /// Returns the motion of the watched boxes since. `None` if no watched box is valid and still there.
     ///
     /// Edges are clamped to four times their 0.9 quantile: a box as large as the world moves far when it passes many
     /// others, however small a share of its edge that is.
     #[must_use]
-    pub fn moved(&self, boxes: &[Aabb]) -> Option<f64> {
+    pub fn motion(&self, boxes: &[Aabb]) -> Option<Motion> {
         let (mut moves, mut edges) = ([(0.0, 0.0); WATCHED], [0.0; WATCHED]);
         let mut count = 0;
         for (id, before) in &self.watched[..self.watching] {
@@ -81,8 +98,11 @@ impl Displacement {
             return None;
         }
         let longest = 4.0 * *edges[..count].select_nth_unstable_by(count * 9 / 10, f32::total_cmp).1;
-        let share = |(by, edge): (f32, f32)| if by == 0.0 { 0.0 } else { (by / edge.min(longest)).min(1.0) };
-        Some(f64::from(moves[..count].iter().copied().map(share).sum::<f32>()) / count as f64)
+        let in_edges = |&(by, edge): &(f32, f32)| if by == 0.0 { 0.0 } else { (by / edge.min(longest)).min(1.0) };
+        let moves = moves[..count].iter().map(in_edges);
+        let far = moves.clone().filter(|&by| by > FAR).count();
+        let count = count as f64;
+        Some(Motion { moved: f64::from(moves.sum::<f32>()) / count, moved_share: far as f64 / count })
     }
 }
 
@@ -107,10 +127,14 @@ mod tests {
         (0..count).map(|k| Aabb::cube([2.0 * k as f32 + shift, 0.0, 0.0], 0.5)).collect()
     }
 
-    fn moved(before: &[Aabb], now: &[Aabb]) -> Option<f64> {
+    fn motion(before: &[Aabb], now: &[Aabb]) -> Option<Motion> {
         let mut displacement = Displacement::default();
         displacement.watch(before);
-        displacement.moved(now)
+        displacement.motion(now)
+    }
+
+    fn moved(before: &[Aabb], now: &[Aabb]) -> Option<f64> {
+        motion(before, now).map(|m| m.moved)
     }
 
     #[test]
@@ -126,8 +150,32 @@ mod tests {
     }
 
     #[test]
+    fn boxes_count_as_moved_from_a_tenth_of_an_edge() {
+        let share = |count, shift| motion(&row(count, 0.0), &row(count, shift)).unwrap().moved_share;
+        for count in [1, 64, 10_000] {
+            assert_eq!([0.0, 0.0625, 0.125, 50.0].map(|shift| share(count, shift)), [0.0, 0.0, 1.0, 1.0]);
+        }
+        // A tenth of the clamped edge: the box as large as the world moves by 8 edges of the others.
+        let scene = |shift| {
+            let world = Aabb::new([shift, 0.0, 0.0], [shift + 1e6, 1e6, 1e6]);
+            row(31, 0.0).into_iter().chain([world]).collect::<Vec<_>>()
+        };
+        assert_eq!(motion(&scene(0.0), &scene(8.0)).unwrap(), Motion { moved: 1.0 / 32.0, moved_share: 1.0 / 32.0 });
+    }
+
+    #[test]
+    fn few_fast_boxes_among_resting_ones_are_told_from_many_slow_ones() {
+        let before = row(64, 0.0);
+        let mut few = before.clone();
+        few[..4].iter_mut().for_each(|b| *b = Aabb::cube([b.min[0], 50.0, 0.0], 0.5));
+        assert_eq!(motion(&before, &few), Some(Motion { moved: 0.0625, moved_share: 0.0625 }));
+        assert_eq!(motion(&before, &row(64, 0.0625)), Some(Motion { moved: 0.0625, moved_share: 0.0 }));
+        assert_eq!(motion(&before, &row(64, 0.125)), Some(Motion { moved: 0.125, moved_share: 1.0 }));
+    }
+
+    #[test]
     fn first_frame_has_no_motion() {
-        assert_eq!(Displacement::default().moved(&row(9, 0.0)), None);
+        assert_eq!(Displacement::default().motion(&row(9, 0.0)), None);
         assert_eq!(moved(&[], &row(9, 0.0)), None);
         assert_eq!(moved(&row(9, 0.0), &[]), None);
     }
@@ -159,7 +207,7 @@ mod tests {
         let mut displacement = Displacement::default();
         let mut met = || {
             displacement.watch(&before);
-            displacement.moved(&now) > Some(0.0)
+            displacement.motion(&now).unwrap().moved > 0.0
         };
         assert!((5..20).contains(&(0..100).filter(|_| met()).count()));
     }
@@ -180,8 +228,9 @@ mod tests {
             for b in &odd {
                 for pad in [0, 3, 100] {
                     let scene = |b: &Aabb| -> Vec<Aabb> { row(pad, 0.0).into_iter().chain([*b; 20]).collect() };
-                    let share = moved(&scene(a), &scene(b)).unwrap_or(1.0);
-                    assert!((0.0..=1.0).contains(&share), "{a:?} to {b:?}: {share}");
+                    let Motion { moved, moved_share } = motion(&scene(a), &scene(b)).unwrap_or(Motion::MOST);
+                    assert!((0.0..=1.0).contains(&moved), "{a:?} to {b:?}: {moved}");
+                    assert!((moved..=1.0).contains(&moved_share) || moved < 0.5, "{a:?} to {b:?}: {moved_share}");
                 }
             }
             if a.defect().is_none() {

@@ -34,8 +34,8 @@ impl FramePlan {
         Self { pairs, ..self }
     }
 
-    /// Returns the motion in a frame, [`Displacement::moved`](crate::algorithm::Displacement::moved) of this frame or
-    /// of a recent one; `None` if unknown.
+    /// Returns the motion in a frame, [`Motion::moved`](crate::algorithm::Motion::moved) of this frame or of a recent
+    /// one; `None` if unknown.
     #[must_use]
     pub fn moved(&self) -> Option<f64> {
         self.moved

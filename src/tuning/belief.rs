@@ -359,7 +359,7 @@ impl Belief {
             let of_basis = std::array::from_fn(|i| own.mean[1 + i]);
             let weights = self.basis.weights(&of_basis, parts.by_motion)[..self.basis.count].to_vec();
             let now = Residual::new(Arc::clone(&self.basis.places), weights, parts.by_motion).with_constant(constant);
-            cost.curve.observed = Some(match cost.curve.observed.take() {
+            cost.curve.residual = Some(match cost.curve.residual.take() {
                 Some(before) => before.plus(&now),
                 None => now,
             });

@@ -81,15 +81,15 @@ struct CostFile {
     /// The effect of several threads; null for one thread and for GPUs.
     helpers: Option<Helpers>,
     /// Correction of the whole: on several threads by what the model leaves unexplained, later by frames that ran.
-    observed: Option<ObservedFile>,
+    residual: Option<ResidualFile>,
     /// Standard deviation of the natural logarithm of measured over modelled time.
     spread_ln: f64,
 }
 
 /// The correction of a cost, on several threads and by frames that ran.
 #[derive(serde::Serialize, serde::Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(rename = "Observed", deny_unknown_fields))]
-struct ObservedFile {
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(rename = "Residual", deny_unknown_fields))]
+struct ResidualFile {
     /// The logarithm of a factor that holds everywhere.
     constant: f64,
     /// The weight of each of the first `places`, as the logarithm of a factor.
@@ -136,7 +136,7 @@ impl From<Tuning> for TuningFile {
             revision,
             work: works.position(&curve.work),
             helpers: curve.helpers,
-            observed: curve.observed.map(|Residual { constant, weights, by_motion, .. }| ObservedFile {
+            residual: curve.residual.map(|Residual { constant, weights, by_motion, .. }| ResidualFile {
                 constant,
                 weights,
                 by_motion,
@@ -179,12 +179,12 @@ impl TryFrom<TuningFile> for Tuning {
                 residual: Some(residual).filter(|r| !r.weights.is_empty()),
             }));
         }
-        let cost = |CostFile { algorithm, revision, work, helpers, observed, spread_ln }| {
+        let cost = |CostFile { algorithm, revision, work, helpers, residual, spread_ln }| {
             let Some(known) = works.get(work) else { return Err(TuningError::NoWork { algorithm, work }) };
-            let observed = observed.map(|ObservedFile { constant, weights, by_motion }| {
+            let residual = residual.map(|ResidualFile { constant, weights, by_motion }| {
                 Residual::new(Arc::clone(&places), weights, by_motion).with_constant(constant)
             });
-            let curve = CostCurve { work: Arc::clone(known), helpers, observed };
+            let curve = CostCurve { work: Arc::clone(known), helpers, residual };
             Ok(AlgorithmCost { algorithm, revision, curve, spread_ln })
         };
         let tuning = Self {

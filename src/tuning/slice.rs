@@ -154,6 +154,7 @@ fn between(a: &Load, b: &Load, share: f64) -> Load {
         strip_candidates: mix(a.strip_candidates, b.strip_candidates),
         pairs: mix(a.pairs, b.pairs),
         moved: a.moved * (1.0 - share) + b.moved * share,
+        moved_share: a.moved_share * (1.0 - share) + b.moved_share * share,
     }
 }
 
@@ -174,7 +175,10 @@ mod tests {
         let load = |k: i32| {
             let n = 10.0_f64.powf(f64::from(k) / 4.0).round();
             let strip_candidates = 3.0 * n.powf(1.2);
-            Load { objects: n as u32, strip_candidates, moved: n.powf(-0.2), pairs: n, axis_candidates: n.powf(1.6) }
+            Load::of_objects(n as u32)
+                .with_candidates(n.powf(1.6), strip_candidates)
+                .with_pairs(n)
+                .with_moved(n.powf(-0.2))
         };
         let loads: Vec<Load> = (4..=24).map(load).collect();
         let places = Arc::new(Places::new(loads.clone()));
@@ -191,8 +195,8 @@ mod tests {
                 CostTerm { term: Term::Moved, unit_ns: unit(20.0) },
             ];
             let weights = (0..places.loads().len()).map(|_| 0.4 * draw(&mut state)).collect();
-            let observed = Residual::new(Arc::clone(&places), weights, false);
-            let curve = CostCurve::new(terms).with_cache(1e6).with_observed(observed);
+            let residual = Residual::new(Arc::clone(&places), weights, false);
+            let curve = CostCurve::new(terms).with_cache(1e6).with_residual(residual);
             AlgorithmCost { algorithm: format!("m{k}@cpu1").parse().unwrap(), revision: 1, curve, spread_ln: 0.1 }
         });
         let costs = costs.collect();

@@ -52,7 +52,7 @@ class SapwiseProbe(rfm.RunOnlyRegressionTest):
         self.prerun_cmds = ['export SAPWISE_NODE="${SLURMD_NODENAME:-}"']
 
     def report(self):
-        """The report, an object as `schemas/report-2.schema.json` has it."""
+        """The report, an object as `schemas/report-3.schema.json` has it."""
         printed = self.printed(self.stdout)
         if not printed.strip():
             told = self.printed(self.stderr).strip().splitlines() or ["nothing"]

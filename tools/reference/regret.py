@@ -102,7 +102,8 @@ def work_ns(tuning, k, load, corrected):
     """Returns nanoseconds on one thread, or on GPUs."""
     work = tuning["works"][k]
     n = load["objects"]
-    counts = dict(load, call=1, all_pairs=n * (n - 1) / 2, sort=n * math.log2(max(n, 1)), moved=n * load["moved"])
+    counts = dict(load, call=1, all_pairs=n * (n - 1) / 2, sort=n * math.log2(max(n, 1)))
+    counts.update(moved=n * load["moved"], moved_share=n * load["moved_share"])
     counts["cold_objects"] = n * max(0.0, 1 - work["cache_bytes"] / max(64 * n, 1))
     ns = sum(t["unit_ns"] * counts[t["term"]] for t in work["terms"])
     if work["fallback"]:
@@ -122,10 +123,10 @@ def cost(tuning, algorithm, load, corrected):
         if called > 0:
             speed_up = 1 + called / most * (helpers["speed_up"] - 1)
             ns = called / most * helpers["call_ns"] + min(ns, (ns + helpers["late_ns"]) / speed_up)
-    observed = algorithm["observed"] if corrected else None
-    if observed:
+    correction = algorithm["residual"] if corrected else None
+    if correction:
         places = tuning.get("places", [])
-        ns *= math.exp(observed["constant"] + residual(observed["weights"], observed["by_motion"], places, load))
+        ns *= math.exp(correction["constant"] + residual(correction["weights"], correction["by_motion"], places, load))
     return ns
 
 

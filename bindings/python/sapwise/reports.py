@@ -21,7 +21,7 @@ def read_report(path):
     Parameters
     ----------
     path : path
-        A file of the form ``report/2``, as ``sapwise probe --out`` writes it.
+        A file of the form ``report/3``, as ``sapwise probe --out`` writes it.
 
     Returns
     -------
@@ -29,7 +29,7 @@ def read_report(path):
         One row for each algorithm, scenario and number of boxes; a record array with the same names where pandas is not
         installed. ``file``; ``host`` (all profiles of one host share it), ``cpu``, ``simd``, ``hypervisor``;
         ``profile`` (the restriction), ``label``, ``date``; ``scenario``, ``objects`` and ``pairs`` (counts),
-        ``axis_candidates``, ``strip_candidates``, ``moved`` (the load); ``algorithm``, ``method``, ``backend``,
+        ``axis_candidates``, ``strip_candidates``, ``moved``, ``moved_share`` (the load); ``algorithm``, ``method``, ``backend``,
         ``threads`` (of the CPU; 0 on GPUs), ``revision``; ``median_ns``, ``q25_ns``, ``q75_ns`` (of the time of a
         frame, nanoseconds), ``samples``, ``foreign_load`` (0 to 1), ``error``, ``gpus``; and a column for each hardware
         parameter with its unit in its name. Unknown values are NaN, or an empty text.
@@ -98,8 +98,8 @@ def _rows(path, among_others=False):
         if among_others:
             return []
         raise InputError(f"{path} is no report, its schema is {schema!r}; `sapwise probe --out` makes one")
-    if schema.split("/")[1].split(".")[0] != "2":
-        raise InputError(f"{path} is {schema}, and only report/2 can be read; measure again with `sapwise probe --out`")
+    if schema.split("/")[1].split(".")[0] != "3":
+        raise InputError(f"{path} is {schema}, and only report/3 can be read; measure again with `sapwise probe --out`")
     try:
         return list(_timings(path, report))
     except (KeyError, TypeError, IndexError, AttributeError) as why:
@@ -130,6 +130,7 @@ def _timings(path, report):
             "axis_candidates": load["axis_candidates"],
             "strip_candidates": load["strip_candidates"],
             "moved": load["moved"],
+            "moved_share": load["moved_share"],
             "foreign_load": _known(point["foreign_load"]),
         }
         for timing in point["timings"]:

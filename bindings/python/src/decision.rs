@@ -23,7 +23,8 @@ use sapwise::algorithm::Load;
 /// runner_up : tuple of (str, float) or None
 ///     The next best algorithm and its expected time in nanoseconds.
 /// load : dict
-///     The estimated load of the frame: ``objects``, ``axis_candidates``, ``strip_candidates``, ``pairs``, ``moved``.
+///     The estimated load of the frame: ``objects``, ``axis_candidates``, ``strip_candidates``, ``pairs``, ``moved``,
+///     ``moved_share``.
 #[pyclass(frozen, name = "Decision", module = "sapwise")]
 pub(crate) struct PyDecision {
     #[pyo3(get)]
@@ -81,5 +82,6 @@ pub(crate) fn as_dict<'py>(py: Python<'py>, load: &Load) -> PyResult<Bound<'py, 
     dict.set_item("strip_candidates", load.strip_candidates)?;
     dict.set_item("pairs", load.pairs)?;
     dict.set_item("moved", load.moved)?;
+    dict.set_item("moved_share", load.moved_share)?;
     Ok(dict)
 }

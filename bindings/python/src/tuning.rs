@@ -6,7 +6,7 @@ use crate::start;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use sapwise::Tuning;
-use sapwise::algorithm::Load;
+use sapwise::algorithm::{Load, Motion};
 use sapwise_tune::{Setup, json};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
@@ -116,12 +116,16 @@ impl PyTuning {
     ///     Pairs that overlap on the axis on which the fewest do, and those of them that share a strip of the grid.
     /// moved : float, default 1.0
     ///     Motion of the boxes in a frame, in mean edges; 1 if no frame helps with the next.
+    /// moved_share : float, default 0.0
+    ///     Share of the boxes that move by more than a tenth of an edge.
     ///
     /// Returns
     /// -------
     /// dict of str to float
     ///     Nanoseconds of each algorithm, the cheapest first. Empty for built-in thresholds, which know no costs.
-    #[pyo3(signature = (objects, *, pairs=0.0, axis_candidates=None, strip_candidates=None, moved=1.0))]
+    #[pyo3(signature = (
+        objects, *, pairs=0.0, axis_candidates=None, strip_candidates=None, moved=1.0, moved_share=0.0
+    ))]
     fn costs<'py>(
         &self,
         py: Python<'py>,
@@ -130,9 +134,10 @@ impl PyTuning {
         axis_candidates: Option<f64>,
         strip_candidates: Option<f64>,
         moved: f64,
+        moved_share: f64,
     ) -> PyResult<Bound<'py, PyDict>> {
         let axis = axis_candidates.unwrap_or(pairs);
-        let load = Load::of_objects(objects).with_pairs(pairs).with_moved(moved);
+        let load = Load::of_objects(objects).with_pairs(pairs).with_moved(moved).with_moved_share(moved_share);
         self.of(py, load.with_candidates(axis, strip_candidates.unwrap_or(axis)))
     }
 
@@ -147,17 +152,20 @@ impl PyTuning {
     ///     The upper corners.
     /// moved : float, default 1.0
     ///     Motion of the boxes in a frame, in mean edges.
+    /// moved_share : float, default 0.0
+    ///     Share of the boxes that move by more than a tenth of an edge.
     ///
     /// Returns
     /// -------
     /// dict of str to float
     ///     Nanoseconds of each algorithm, the cheapest first.
-    #[pyo3(signature = (boxes, upper=None, *, moved=1.0))]
+    #[pyo3(signature = (boxes, upper=None, *, moved=1.0, moved_share=0.0))]
     fn costs_of<'py>(
         &self,
         boxes: &Bound<'py, PyAny>,
         upper: Option<&Bound<'py, PyAny>>,
         moved: f64,
+        moved_share: f64,
     ) -> PyResult<Bound<'py, PyDict>> {
         let py = boxes.py();
         let given = self::boxes(boxes, upper, "")?;
@@ -165,10 +173,10 @@ impl PyTuning {
         if let Some((index, defect)) = boxes.iter().enumerate().find_map(|(k, b)| b.defect().map(|d| (k, d))) {
             return Err(crate::error::invalid_box(py, "", index, defect));
         }
-        self.of(py, py.detach(|| Load::estimate(boxes, None, Some(moved))))
+        self.of(py, py.detach(|| Load::estimate(boxes, None, Some(Motion { moved, moved_share }))))
     }
 
-    /// Write it as JSON (``tuning/2``), which the library and the command read.
+    /// Write it as JSON (``tuning/3``), which the library and the command read.
     fn to_json(&self, py: Python<'_>) -> PyResult<String> {
         json::write_tuning(&self.tuning).map_err(|why| failed(py, with_cause(&why)))
     }

@@ -59,9 +59,9 @@ def test_it_is_kept_and_taken_again(tuning, folder):
 
 def test_json_goes_there_and_back(tuning):
     text = tuning.to_json()
-    assert json.loads(text)["schema"] == "tuning/2"
+    assert json.loads(text)["schema"] == "tuning/3"
     assert sapwise.Tuning.from_json(text).to_json() == text
-    for damaged in ("{", '{"schema": "report/2"}', text.replace('"revision"', '"version"', 1)):
+    for damaged in ("{", '{"schema": "report/3"}', text.replace('"revision"', '"version"', 1)):
         with pytest.raises(sapwise.InputError):
             sapwise.Tuning.from_json(damaged)
 

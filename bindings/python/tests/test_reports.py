@@ -36,7 +36,8 @@ def test_a_row_for_each_timing_with_the_figures_of_the_file():
     for row, (point, timing) in zip(found, timings):
         assert (row["scenario"], row["algorithm"]) == (point["scenario"], timing["algorithm"])
         load = point["load"]
-        assert (row["objects"], row["pairs"], row["moved"]) == (load["objects"], point["pairs"], load["moved"])
+        assert (row["objects"], row["pairs"]) == (load["objects"], point["pairs"])
+        assert (row["moved"], row["moved_share"]) == (load["moved"], load["moved_share"])
         samples = timing["samples_ns"]
         assert row["samples"] == len(samples)
         if len(samples) > 1:
@@ -89,10 +90,10 @@ def test_time_over_the_number_of_boxes_in_three_lines():
     [
         ("{", "no JSON"),
         ("[]", "no report"),
-        ('{"schema": "tuning/2"}', "schema is 'tuning/2'"),
-        ('{"schema": "report/1"}', "sapwise probe"),
-        ('{"schema": "report/2"}', "lacks"),
-        ('{"schema": "report/2", "hardware": 3}', "lacks"),
+        ('{"schema": "tuning/3"}', "schema is 'tuning/3'"),
+        ('{"schema": "report/2"}', "sapwise probe"),
+        ('{"schema": "report/3"}', "lacks"),
+        ('{"schema": "report/3", "hardware": 3}', "lacks"),
         ("\x00\xff", "no JSON"),
     ],
 )
@@ -107,7 +108,7 @@ def test_files_that_are_no_reports(tmp_path, text, why):
 def test_folders(tmp_path):
     with pytest.raises(sapwise.InputError, match="holds no report"):
         sapwise.read_reports(tmp_path)
-    (tmp_path / "tuning.json").write_text('{"schema": "tuning/2"}')
+    (tmp_path / "tuning.json").write_text('{"schema": "tuning/3"}')
     with pytest.raises(sapwise.InputError, match="holds no report"):
         sapwise.read_reports(tmp_path)
     (tmp_path / "a.json").write_text(ONE.read_text())

@@ -232,7 +232,7 @@ pub(crate) fn load(scenario: &str, n: f64) -> Load {
         "uniform" => (0.3 * n.powf(5.0 / 3.0), 4.0 * n, 1.0 * n, 0.04),
         _ => (0.8 * n.powf(1.7), 3.0 * n.powf(1.25), 1.2 * n.powf(1.2), n.powf(-0.2)),
     };
-    Load::of_objects(n as u32).with_candidates(axis, strip).with_pairs(pairs).with_moved(moved)
+    Load::of_objects(n as u32).with_candidates(axis, strip).with_pairs(pairs).with_moved(moved).with_moved_share(moved)
 }
 
 fn method(name: &str, backend: BackendClass, terms: &[(Term, Scale, f64)]) -> MethodModel {
@@ -295,7 +295,7 @@ pub(crate) fn truth() -> Vec<MethodModel> {
             (Objects, Cycle, 15.0),
             (ColdObjects, Byte, 60.0),
             (Pairs, Cycle, 20.0),
-            (Moved, Cycle, 150.0),
+            (MovedShare, Cycle, 150.0),
         ],
     );
     pair_cache.fallback = Some(FallbackModel { method: "bvh".to_owned(), factor: 1.1 });

@@ -211,7 +211,7 @@ impl Training {
 }
 
 /// The training in the file of a model, whose other keys are the model's.
-const TRAINING: Format = Format::new("model", 4).skipping(&["name", "ranges", "ratios_90_ln", "places", "methods"]);
+const TRAINING: Format = Format::new("model", 5).skipping(&["name", "ranges", "ratios_90_ln", "places", "methods"]);
 
 /// Reads the file of a model.
 ///

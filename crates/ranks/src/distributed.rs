@@ -273,14 +273,16 @@ impl<E: Exchange> Distributed<E> {
             count(load.strip_candidates),
             count(load.pairs),
             count(load.moved * objects * PARTS),
+            count(load.moved_share * objects * PARTS),
         ];
         self.exchange.sum(&mut sums);
-        let [objects, axis, strip, pairs, moved] = sums.map(|s| s as f64);
+        let [objects, axis, strip, pairs, moved, moved_share] = sums.map(|s| s as f64);
         let mean = |v: f64| v / self.ranks() as f64;
         Load::of_objects(mean(objects).clamp(1.0, f64::from(u32::MAX)) as u32)
             .with_candidates(mean(axis), mean(strip))
             .with_pairs(mean(pairs))
             .with_moved(moved / PARTS / objects.max(1.0))
+            .with_moved_share(moved_share / PARTS / objects.max(1.0))
     }
 
     /// Puts each box where it is searched: here or into the outbox. Ends at the first invalid box.

@@ -1,6 +1,6 @@
 //! Reads and writes tunings, models and every other file of Sapwise as JSON text.
 //!
-//! The first key of a file names its schema: `tuning/2`, or `tuning/2.3` for a newer minor version, which only added
+//! The first key of a file names its schema: `tuning/3`, or `tuning/3.3` for a newer minor version, which only added
 //! keys. Keys that this version does not know are skipped and listed in a file of a newer minor version, and are an
 //! error in any other file. A file of another major version is refused.
 

@@ -31,11 +31,11 @@ fn the_built_in_model_knows_every_method_of_this_build() {
 /// Files as each schema version was first written. Nobody changes them.
 #[test]
 fn every_schema_version_stays_readable() {
-    let model = json::model(include_str!("fixtures/model-4.json")).unwrap();
+    let model = json::model(include_str!("fixtures/model-5.json")).unwrap();
     assert!(model.methods.len() == 3 && model.methods.iter().all(|m| m.backend == BackendClass::Cpu));
     let written = json::write_model(&model).unwrap();
     assert!(json::model(&written).unwrap() == model);
-    let tuning = json::tuning(include_str!("fixtures/tuning-2.json")).unwrap();
+    let tuning = json::tuning(include_str!("fixtures/tuning-3.json")).unwrap();
     assert_eq!(json::tuning(&json::write_tuning(&tuning).unwrap()).unwrap(), tuning);
     let ranking = tuning.rank(&Load::of_objects(10), |_| true).unwrap();
     assert_eq!(tuning.costs[ranking.best].algorithm.to_string(), "brute@cpu1");
@@ -48,21 +48,21 @@ fn damaged_files_are_refused_with_the_place() {
     let refused = |text: &str| json::model(text).unwrap_err().to_string();
     assert!(refused(&whole[..whole.len() / 2]).contains("line"));
     assert!(refused("").contains("line"));
-    assert!(refused(&whole.replace("model/4", "model/9")).contains("model/9"));
+    assert!(refused(&whole.replace("model/5", "model/9")).contains("model/9"));
     assert!(refused(&whole.replacen("\"method\"", "\"methode\"", 1)).contains("methods[0]"));
     assert!(refused(&whole.replacen("\"unit\": ", "\"unit\": -", 1)).contains("unit"));
     // Found by the fuzz target `files`: its costs were no numbers.
     assert!(refused(&whole.replacen("\"axis_candidates\": ", "\"axis_candidates\": -", 1)).contains("places[0]"));
-    let nested = format!("{{\"schema\": \"model/4\", \"name\": {}{}}}", "[".repeat(10_000), "]".repeat(10_000));
+    let nested = format!("{{\"schema\": \"model/5\", \"name\": {}{}}}", "[".repeat(10_000), "]".repeat(10_000));
     assert!(!refused(&nested).is_empty());
 }
 
 #[test]
 fn old_files_are_refused_by_name() {
-    let model = json::model("{\"schema\": \"model/1\"}").unwrap_err().to_string();
-    let tuning = json::tuning("{\"schema\": \"fields/1\"}").unwrap_err().to_string();
-    assert!(model.contains("\"model/1\"") && model.contains("`sapwise train REPORTS... --out MODEL.json`"), "{model}");
-    assert!(tuning.contains("\"fields/1\"") && tuning.contains("`sapwise predict --out TUNING.json`"), "{tuning}");
+    let model = json::model("{\"schema\": \"model/4\"}").unwrap_err().to_string();
+    let tuning = json::tuning("{\"schema\": \"tuning/2\"}").unwrap_err().to_string();
+    assert!(model.contains("\"model/4\"") && model.contains("`sapwise train REPORTS... --out MODEL.json`"), "{model}");
+    assert!(tuning.contains("\"tuning/2\"") && tuning.contains("`sapwise predict --out TUNING.json`"), "{tuning}");
 }
 
 /// A prediction of the built-in model for a machine of two cores, as a file.

@@ -81,7 +81,7 @@ impl Here {
     }
 
     fn model(&self, model: &Model, finding: &mut Finding) {
-        finding.schema = Some("model/4");
+        finding.schema = Some("model/5");
         let used = model.methods.iter().map(|m| ((m.backend, m.method.as_str()), m.revision));
         finding.set_current(revisions::stale(used, &self.registry), "train it again on new reports");
         finding.applicable = finding.current;

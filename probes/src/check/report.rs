@@ -27,7 +27,7 @@ const MOVED_SHARE: f64 = 0.1;
 
 impl Here {
     pub(super) fn report(&self, report: &Report, finding: &mut Finding) {
-        finding.schema = Some("report/2");
+        finding.schema = Some("report/3");
         finding.set_current(revisions::stale_in_report(report, &self.registry), "probe again");
         let impossible = impossible(report);
         finding.sound = impossible.is_empty();

@@ -7,7 +7,7 @@ use sapwise::{AlgorithmId, Tuning};
 
 impl Here {
     pub(super) fn tuning(&self, tuning: &Tuning, finding: &mut Finding) {
-        finding.schema = Some("tuning/2");
+        finding.schema = Some("tuning/3");
         finding.set_current(
             revisions::stale_in_tuning(tuning, &self.registry),
             "predict again, or probe again where they were measured",

@@ -174,7 +174,7 @@ mod tests {
 
     #[test]
     fn a_report_with_a_flaw_is_measured_again_and_one_of_another_command_stays() {
-        let text = include_str!("../../../crates/lab/tests/fixtures/report-2-gpu.json");
+        let text = include_str!("../../../crates/lab/tests/fixtures/report-3-gpu.json");
         let mut report: Report = sapwise_lab::report::read(text).unwrap().value;
         // Revisions change with the algorithms.
         report.algorithms.clear();

@@ -34,14 +34,14 @@ fn csv(out: &mut dyn Write, outcome: &Outcome) -> anyhow::Result<()> {
     let times: String = order.iter().map(|&k| format!(",{}_ns", ids[k])).collect();
     writeln!(
         out,
-        "frame,objects,axis_candidates,strip_candidates,pairs,moved,algorithm,reason,predicted_ns,measured_ns,\
-         runner_up,runner_up_ns,adaptive_ns,windows_ns{times}"
+        "frame,objects,axis_candidates,strip_candidates,pairs,moved,moved_share,algorithm,reason,predicted_ns,\
+         measured_ns,runner_up,runner_up_ns,adaptive_ns,windows_ns{times}"
     )?;
     // Empty when a frame was not timed, or an algorithm at it.
     let number = |ns: Option<f64>| ns.filter(|ns| ns.is_finite()).map_or(String::new(), |ns| format!("{ns}"));
     for (at, (frame, choice)) in outcome.frames.iter().zip(&outcome.choices).enumerate() {
-        let Load { axis_candidates, strip_candidates, pairs, moved, .. } = choice.load;
-        write!(out, "{at},{},{axis_candidates},{strip_candidates},{pairs},{moved},", frame.objects)?;
+        let Load { axis_candidates, strip_candidates, pairs, moved, moved_share, .. } = choice.load;
+        write!(out, "{at},{},{axis_candidates},{strip_candidates},{pairs},{moved},{moved_share},", frame.objects)?;
         write!(out, "{},{},", choice.chosen.map_or("", |k| &ids[k]), name(choice.reason))?;
         write!(out, "{},{},", number(choice.predicted_ns), number(choice.measured_ns))?;
         let (id, ns) = choice.runner_up.as_ref().map_or((String::new(), None), |r| (r.0.to_string(), Some(r.1)));

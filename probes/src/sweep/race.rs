@@ -210,7 +210,7 @@ impl Race {
 
     /// The load of the frame that ran, with the pairs of the previous one.
     fn load(&self, scene: &Scene, before: Option<u64>) -> Load {
-        Load::estimate(scene.boxes(), before.map(|pairs| pairs as f64), self.displacement.moved(scene.boxes()))
+        Load::estimate(scene.boxes(), before.map(|pairs| pairs as f64), self.displacement.motion(scene.boxes()))
     }
 
     /// The point without foreign load and core-to-core latency.
@@ -249,7 +249,8 @@ impl MeanLoad {
         self.sum = Load::of_objects(load.objects)
             .with_pairs(sum.pairs + load.pairs)
             .with_candidates(sum.axis_candidates + load.axis_candidates, sum.strip_candidates + load.strip_candidates)
-            .with_moved(sum.moved + load.moved);
+            .with_moved(sum.moved + load.moved)
+            .with_moved_share(sum.moved_share + load.moved_share);
         self.frames += 1.0;
     }
 
@@ -259,6 +260,7 @@ impl MeanLoad {
             .with_pairs(sum.pairs / frames)
             .with_candidates(sum.axis_candidates / frames, sum.strip_candidates / frames)
             .with_moved(sum.moved / frames)
+            .with_moved_share(sum.moved_share / frames)
     }
 }
 
@@ -376,10 +378,17 @@ mod tests {
     fn a_frame_in_which_all_jumps_is_one_of_many() {
         let mut load = MeanLoad::default();
         for moved in [0.04, 0.04, 1.0, 0.04] {
-            load.add(&Load::of_objects(10).with_pairs(moved * 100.0).with_candidates(8.0, 6.0).with_moved(moved));
+            load.add(
+                &Load::of_objects(10)
+                    .with_pairs(moved * 100.0)
+                    .with_candidates(8.0, 6.0)
+                    .with_moved(moved)
+                    .with_moved_share(moved.floor()),
+            );
         }
         let mean = load.mean();
         assert!((mean.moved - 0.28).abs() < 1e-12 && (mean.pairs - 28.0).abs() < 1e-12, "{mean:?}");
+        assert_eq!(mean.moved_share, 0.25);
         assert_eq!((mean.objects, mean.axis_candidates, mean.strip_candidates), (10, 8.0, 6.0));
     }
 

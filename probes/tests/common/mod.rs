@@ -15,7 +15,7 @@ pub(crate) fn sapwise() -> Command {
 
 /// A sound and current report of this build, with twelve points. `machine` is a hex digit that tells machines apart.
 pub(crate) fn small_report(machine: &str) -> Value {
-    let text = include_str!("../../../crates/lab/tests/fixtures/report-2.json");
+    let text = include_str!("../../../crates/lab/tests/fixtures/report-3.json");
     let mut report: Value = serde_json::from_str(text).unwrap();
     report["label"] = "real_full".into();
     report["hardware"]["machine"]["physical_id"] = machine.repeat(16).into();

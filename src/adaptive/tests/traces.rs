@@ -101,7 +101,7 @@ impl Trace {
             let boxes = &scene.boxes()[..objects];
             match at % 10 {
                 0 => displacement.watch(boxes),
-                1 => loads.push((at, Load::estimate(boxes, Some(self.pairs[at]), displacement.moved(boxes)))),
+                1 => loads.push((at, Load::estimate(boxes, Some(self.pairs[at]), displacement.motion(boxes)))),
                 _ => {}
             }
             scene.advance();

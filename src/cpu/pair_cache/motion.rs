@@ -309,7 +309,7 @@ impl Motion {
     /// How far the boxes moved since the frame before, and how many pairs for each there are; `None` where nobody
     /// knows.
     fn known(&self, plan: &FramePlan, boxes: &[Aabb]) -> Option<(f32, f32)> {
-        let moved = plan.moved().or_else(|| self.displacement.moved(boxes))?;
+        let moved = plan.moved().or_else(|| self.displacement.motion(boxes).map(|m| m.moved))?;
         // What this method has found itself may be of long ago.
         let density = plan.pairs().map(|pairs| pairs as f32 / boxes.len().max(1) as f32).or(self.density)?;
         Some((moved as f32, density))
@@ -320,7 +320,9 @@ impl Motion {
         if !self.ends_early || !self.pause.is_multiple_of(LOOK) {
             return false;
         }
-        let Some(moved) = plan.moved().or_else(|| self.displacement.moved(boxes)) else { return false };
+        let Some(moved) = plan.moved().or_else(|| self.displacement.motion(boxes).map(|m| m.moved)) else {
+            return false;
+        };
         self.paused_at = self.paused_at.max(moved as f32);
         (moved as f32) < (CALMER * self.paused_at).max(STILL)
     }

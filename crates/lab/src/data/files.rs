@@ -19,11 +19,11 @@ const LARGEST_BYTES: u64 = 64 << 20;
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Document {
-    /// `report/2`.
+    /// `report/3`.
     Report(Box<Report>),
-    /// `model/4`.
+    /// `model/5`.
     Model(Box<StoredModel>),
-    /// `tuning/2`.
+    /// `tuning/3`.
     Tuning(Box<Tuning>),
 }
 
@@ -50,7 +50,7 @@ pub fn read_document(path: &Path, warn: &dyn Fn(&str)) -> anyhow::Result<Documen
             let read = Format::TUNING.read(&text).with_context(unsound)?;
             (Document::Tuning(Box::new(read.value)), read.skipped)
         }
-        _ => bail!("{} has the schema {schema}, which is none of report/2, model/4 and tuning/2", path.display()),
+        _ => bail!("{} has the schema {schema}, which is none of report/3, model/5 and tuning/3", path.display()),
     };
     if !skipped.is_empty() {
         warn(&ignored(path, &schema, &skipped));

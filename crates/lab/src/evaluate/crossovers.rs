@@ -124,8 +124,8 @@ mod tests {
     fn slower(costs: &[AlgorithmCost], id: &AlgorithmId, factor: f64) -> Vec<AlgorithmCost> {
         let mut costs = costs.to_vec();
         for cost in costs.iter_mut().filter(|c| c.algorithm == *id) {
-            let observed = cost.curve.observed.as_mut().expect("measured costs were observed");
-            observed.constant += factor.ln();
+            let residual = cost.curve.residual.as_mut().expect("measured costs were observed");
+            residual.constant += factor.ln();
         }
         costs
     }

@@ -135,6 +135,7 @@ fn features(hardware: &Hardware, backend: &Backend, load: &Load) -> Vec<f64> {
         load.strip_candidates.ln_1p(),
         load.pairs.ln_1p(),
         load.moved,
+        load.moved_share,
         f64::from(backend.width()).ln(),
     ];
     let logarithm = |value: Option<f64>| value.filter(|v| *v > 0.0).map_or(0.0, f64::ln);

@@ -69,7 +69,7 @@ fn on_cpu(method: &str) -> Vec<(Term, Scale)> {
     list.extend(tests(method).iter().flat_map(|&t| [(t, Lane), (t, Cycle)]));
     list.push((Pairs, Cycle));
     if is_incremental(method) {
-        list.push((Moved, Cycle));
+        list.push((MovedShare, Cycle));
     }
     list
 }

@@ -4,7 +4,7 @@ use super::record::Report;
 use sapwise_tune::json::{Error, Format, Read};
 
 /// Files of reports.
-pub const FORMAT: Format = Format::new("report", 2);
+pub const FORMAT: Format = Format::new("report", 3);
 
 /// Reads a report and checks its numbers. The answer names the keys of a newer minor version that were skipped.
 ///
@@ -53,7 +53,7 @@ mod tests {
 
     #[test]
     fn a_report_reads_back_whatever_its_texts_hold() {
-        let text = include_str!("../../tests/fixtures/report-2.json");
+        let text = include_str!("../../tests/fixtures/report-3.json");
         let mut file: Value = serde_json::from_str(text).unwrap();
         let hostile = "\n  \"points\": []";
         file["provenance"]["command"] = json!(hostile);
@@ -70,7 +70,7 @@ mod tests {
 
     #[test]
     fn a_figure_that_can_not_be_is_refused_with_its_place() {
-        let text = include_str!("../../tests/fixtures/report-2.json");
+        let text = include_str!("../../tests/fixtures/report-3.json");
         let refused = |from: &str, to: &str| read(&text.replacen(from, to, 1)).unwrap_err().to_string();
         let told = refused("\"axis_candidates\":", "\"axis_candidates\":-");
         assert!(told.contains("point 0 (uniform at"), "{told}");

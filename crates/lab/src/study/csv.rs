@@ -14,7 +14,8 @@ fn table(columns: &str, mut rows: impl Iterator<Item = Vec<String>>) -> Result<S
 
 /// Every median and mean time of the studied reports.
 pub(super) fn timings(material: &Material) -> Result<String> {
-    let columns = "report host scenario algorithm method processor threads gpus objects pairs moved median_ns mean_ns";
+    let columns = "report host scenario algorithm method processor threads gpus objects pairs moved moved_share \
+                   median_ns mean_ns";
     let mut rows = Vec::new();
     for profile in &material.profiles {
         for spot in &profile.points {
@@ -25,9 +26,9 @@ pub(super) fn timings(material: &Material) -> Result<String> {
                 let words = [&profile.file, profile.machine(), &spot.scenario, &id.to_string(), id.method()];
                 let processor = if on_gpus { "gpu" } else { "cpu" };
                 let counts = [threads, gpus, spot.load.objects].map(|n| n.to_string());
-                let numbers = [spot.load.pairs, spot.load.moved, median_ns, *mean_ns].map(|n| n.to_string());
+                let numbers = [spot.load.pairs, spot.load.moved, spot.load.moved_share, median_ns, *mean_ns];
                 let words = words.map(str::to_owned).into_iter().chain([processor.to_owned()]);
-                rows.push(words.chain(counts).chain(numbers).collect());
+                rows.push(words.chain(counts).chain(numbers.map(|n| n.to_string())).collect());
             }
         }
     }

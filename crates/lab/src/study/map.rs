@@ -114,7 +114,7 @@ fn spread_evenly(objects: f64, pairs_of_object: f64, moved: f64) -> Load {
     let mut random = Random::named(SEED, &["map"]);
     let mut middle = || [(); 3].map(|()| random.uniform() as f32 * edge);
     let boxes: Vec<Aabb> = (0..few).map(|_| Aabb::cube(middle(), 0.5)).collect();
-    let load = Load::estimate(&boxes, Some(f64::from(few) * pairs_of_object), Some(moved));
+    let load = Load::estimate(&boxes, Some(f64::from(few) * pairs_of_object), None);
     // The world grows with its objects: pairs and strips grow as they do, and an axis with the power 5/3, since each
     // object shares it with as many as its cross-section holds.
     let growth = f64::from(objects) / f64::from(few);

@@ -38,8 +38,8 @@ pub fn loads(
         counter
             .find_pairs(scene.boxes(), &mut pairs)
             .with_context(|| format!("the pairs of {scenario} at {objects} objects"))?;
-        let moved = displacement.moved(scene.boxes());
-        let load = Load::estimate(scene.boxes(), Some(pairs.len() as f64), moved);
+        let motion = displacement.motion(scene.boxes());
+        let load = Load::estimate(scene.boxes(), Some(pairs.len() as f64), motion);
         done(&load)?;
         loads.push(load);
     }

@@ -1,6 +1,6 @@
 //! The file that keeps the tuning of this machine from one start to the next.
 //!
-//! It is a `tuning/2` file. Its name is a hash of everything that the tuning depends on, and its modification time is
+//! It is a `tuning/3` file. Its name is a hash of everything that the tuning depends on, and its modification time is
 //! the time of the measurement.
 
 use crate::json;

@@ -50,10 +50,10 @@ mod tests {
             let mut displacement = Displacement::default();
             displacement.watch(scene.boxes());
             scene.advance();
-            let found = Load::estimate(scene.boxes(), None, displacement.moved(scene.boxes()));
+            let found = Load::estimate(scene.boxes(), None, displacement.motion(scene.boxes()));
             let figures = |l: &Load| [f64::from(l.objects), l.axis_candidates, l.strip_candidates, l.pairs, l.moved];
             let same = figures(&stored).into_iter().zip(figures(&found)).all(|(a, b)| (a / b - 1.0).abs() < 1e-5);
-            assert!(same, "stored {stored:?}, found {found:?}");
+            assert!(same && stored.moved_share == found.moved_share, "stored {stored:?}, found {found:?}");
         }
     }
 }

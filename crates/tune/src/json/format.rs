@@ -6,7 +6,7 @@ use serde::de::{DeserializeOwned, Error as _};
 use serde_ignored::Path;
 use std::fmt;
 
-/// The schema of a file: `tuning/2`, or `tuning/2.3`.
+/// The schema of a file: `tuning/3`, or `tuning/3.3`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Schema {
     name: String,
@@ -107,10 +107,10 @@ pub struct Format {
 
 impl Format {
     /// Files of tunings.
-    pub const TUNING: Self = Self::new("tuning", 2);
+    pub const TUNING: Self = Self::new("tuning", 3);
 
     /// Files of models, without the notes of their training.
-    pub const MODEL: Self = Self::new("model", 4).skipping(&["training"]);
+    pub const MODEL: Self = Self::new("model", 5).skipping(&["training"]);
 
     /// A kind of file in the major version that the caller reads and writes.
     #[must_use]

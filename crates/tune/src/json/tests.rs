@@ -11,7 +11,7 @@ fn sample() -> Value {
 #[test]
 fn a_tuning_reads_back_and_its_first_key_is_the_schema() {
     let text = write_tuning(&tuning(&sample().to_string()).unwrap()).unwrap();
-    assert!(text.starts_with("{\n  \"schema\": \"tuning/2\",\n  \"source\": \"default\",\n"), "{text}");
+    assert!(text.starts_with("{\n  \"schema\": \"tuning/3\",\n  \"source\": \"default\",\n"), "{text}");
     assert_eq!(tuning(&text).unwrap().source, Source::Default);
 }
 
@@ -22,8 +22,8 @@ fn an_unknown_key_is_an_error_and_in_a_newer_minor_version_it_is_listed() {
     file["steps"][0]["why"] = json!({ "deep": [1, 2] });
     let error = tuning(&file.to_string()).unwrap_err();
     assert!(matches!(&error, Error::UnknownKey { .. }), "{error:?}");
-    assert!(error.to_string().contains("is no key of tuning/2"), "{error}");
-    file["schema"] = json!("tuning/2.3");
+    assert!(error.to_string().contains("is no key of tuning/3"), "{error}");
+    file["schema"] = json!("tuning/3.3");
     let read = Format::TUNING.read::<Tuning>(&file.to_string()).unwrap();
     assert_eq!((read.schema.minor(), read.value), (3, tuning(&sample().to_string()).unwrap()));
     let mut skipped = read.skipped;
@@ -33,12 +33,12 @@ fn an_unknown_key_is_an_error_and_in_a_newer_minor_version_it_is_listed() {
 
 #[test]
 fn another_schema_is_refused_by_name() {
-    for other in ["fields/1", "model/4", "tuning/1", "tuning/3", "tuning", "tuning/+2", "tuning/2.x", ""] {
+    for other in ["fields/1", "model/5", "tuning/2", "tuning/4", "tuning", "tuning/+3", "tuning/3.x", ""] {
         let mut file = sample();
         file["schema"] = json!(other);
         let error = tuning(&file.to_string()).unwrap_err();
         assert!(matches!(error, Error::OtherSchema { .. }), "{other}: {error}");
-        assert!(error.to_string().contains("\"tuning/2\", which `sapwise predict"), "{other}: {error}");
+        assert!(error.to_string().contains("\"tuning/3\", which `sapwise predict"), "{other}: {error}");
     }
     let old = model(r#"{"schema": "model/1"}"#).unwrap_err().to_string();
     assert!(old.contains("\"model/1\"") && old.contains("`sapwise train"), "{old}");

@@ -65,7 +65,7 @@ impl MethodModel {
         if let Backend::Cpu(threads @ 2..) = *backend {
             curve.helpers = self.helpers.unwrap_or(UNSEEN).on(hardware, threads)?;
             let at = GroupResidual::of_threads(hardware, threads)?;
-            curve.observed = self.residual_at(&self.thread_residual, &at, places);
+            curve.residual = self.residual_at(&self.thread_residual, &at, places);
         }
         curve.defect().map_or(Ok(curve), |e| Err(PredictError::Curve(e)))
     }
