@@ -130,7 +130,7 @@ fn damaged_files_are_named_with_the_place_and_hide_no_others() {
         (path("truncated.json", &good.as_bytes()[..good.len() / 2]), "line 1 column"),
         (path("cut.json", &good.as_bytes()[..good.len() / 3]), "the text ends too early"),
         (path("empty.json", b""), "line 1 column 0"),
-        (path("future.json", with("/schema", "report/3".into()).as_bytes()), "report/3"),
+        (path("future.json", with("/schema", "report/4".into()).as_bytes()), "report/4"),
         (path("nested.json", nested.as_bytes()), "line 1 column"),
         (path("deep.json", format!("{{\"schema\": \"report/3\", \"x\": {nested}}}").as_bytes()), "x is no key"),
         (path("unknown.json", good.replacen("\"label\"", "\"lable\"", 1).as_bytes()), "lable"),

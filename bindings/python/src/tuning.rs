@@ -126,6 +126,7 @@ impl PyTuning {
     #[pyo3(signature = (
         objects, *, pairs=0.0, axis_candidates=None, strip_candidates=None, moved=1.0, moved_share=0.0
     ))]
+    #[expect(clippy::too_many_arguments, reason = "they have names in Python")]
     fn costs<'py>(
         &self,
         py: Python<'py>,

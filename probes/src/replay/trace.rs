@@ -82,7 +82,7 @@ mod tests {
         csv(&mut text, &outcome).unwrap();
         let text = String::from_utf8(text).unwrap();
         let rows: Vec<Vec<&str>> = text.lines().map(|l| l.split(',').collect()).collect();
-        assert_eq!((rows.len(), rows[0].len(), rows[1].len(), rows[2].len()), (3, 16, 16, 16), "{text}");
+        assert_eq!((rows.len(), rows[0].len(), rows[1].len(), rows[2].len()), (3, 17, 17, 17), "{text}");
         let cells = |row: usize, names: &[&str]| -> Vec<&str> {
             names.iter().map(|name| rows[row][rows[0].iter().position(|n| n == name).unwrap()]).collect()
         };
