@@ -74,10 +74,10 @@ class Tuning:
         axis_candidates: float | None = None,
         strip_candidates: float | None = None,
         moved: float = 1.0,
-        moved_share: float = 0.0,
+        moved_share: float | None = None,
     ) -> dict[str, float]: ...
     def costs_of(
-        self, boxes: ArrayLike, upper: ArrayLike | None = None, *, moved: float = 1.0, moved_share: float = 0.0
+        self, boxes: ArrayLike, upper: ArrayLike | None = None, *, moved: float = 1.0, moved_share: float | None = None
     ) -> dict[str, float]: ...
     def to_json(self) -> str: ...
     @staticmethod

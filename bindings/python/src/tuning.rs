@@ -47,6 +47,11 @@ impl From<Tuning> for PyTuning {
     }
 }
 
+/// The share of boxes that move by more than a tenth of an edge: as given, or as if all moved by `moved`.
+fn share(moved: f64, given: Option<f64>) -> f64 {
+    given.unwrap_or(if moved > 0.1 { 1.0 } else { 0.0 })
+}
+
 #[pymethods]
 impl PyTuning {
     #[getter]
@@ -116,15 +121,15 @@ impl PyTuning {
     ///     Pairs that overlap on the axis on which the fewest do, and those of them that share a strip of the grid.
     /// moved : float, default 1.0
     ///     Motion of the boxes in a frame, in mean edges; 1 if no frame helps with the next.
-    /// moved_share : float, default 0.0
-    ///     Share of the boxes that move by more than a tenth of an edge.
+    /// moved_share : float, optional
+    ///     Share of the boxes that move by more than a tenth of an edge. By default as if all moved by ``moved``.
     ///
     /// Returns
     /// -------
     /// dict of str to float
     ///     Nanoseconds of each algorithm, the cheapest first. Empty for built-in thresholds, which know no costs.
     #[pyo3(signature = (
-        objects, *, pairs=0.0, axis_candidates=None, strip_candidates=None, moved=1.0, moved_share=0.0
+        objects, *, pairs=0.0, axis_candidates=None, strip_candidates=None, moved=1.0, moved_share=None
     ))]
     #[expect(clippy::too_many_arguments, reason = "they have names in Python")]
     fn costs<'py>(
@@ -135,10 +140,11 @@ impl PyTuning {
         axis_candidates: Option<f64>,
         strip_candidates: Option<f64>,
         moved: f64,
-        moved_share: f64,
+        moved_share: Option<f64>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let axis = axis_candidates.unwrap_or(pairs);
-        let load = Load::of_objects(objects).with_pairs(pairs).with_moved(moved).with_moved_share(moved_share);
+        let load =
+            Load::of_objects(objects).with_pairs(pairs).with_moved(moved).with_moved_share(share(moved, moved_share));
         self.of(py, load.with_candidates(axis, strip_candidates.unwrap_or(axis)))
     }
 
@@ -153,20 +159,20 @@ impl PyTuning {
     ///     The upper corners.
     /// moved : float, default 1.0
     ///     Motion of the boxes in a frame, in mean edges.
-    /// moved_share : float, default 0.0
-    ///     Share of the boxes that move by more than a tenth of an edge.
+    /// moved_share : float, optional
+    ///     Share of the boxes that move by more than a tenth of an edge. By default as if all moved by ``moved``.
     ///
     /// Returns
     /// -------
     /// dict of str to float
     ///     Nanoseconds of each algorithm, the cheapest first.
-    #[pyo3(signature = (boxes, upper=None, *, moved=1.0, moved_share=0.0))]
+    #[pyo3(signature = (boxes, upper=None, *, moved=1.0, moved_share=None))]
     fn costs_of<'py>(
         &self,
         boxes: &Bound<'py, PyAny>,
         upper: Option<&Bound<'py, PyAny>>,
         moved: f64,
-        moved_share: f64,
+        moved_share: Option<f64>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let py = boxes.py();
         let given = self::boxes(boxes, upper, "")?;
@@ -174,6 +180,7 @@ impl PyTuning {
         if let Some((index, defect)) = boxes.iter().enumerate().find_map(|(k, b)| b.defect().map(|d| (k, d))) {
             return Err(crate::error::invalid_box(py, "", index, defect));
         }
+        let moved_share = share(moved, moved_share);
         self.of(py, py.detach(|| Load::estimate(boxes, None, Some(Motion { moved, moved_share }))))
     }
 
