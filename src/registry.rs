@@ -168,8 +168,8 @@ impl Registry {
         self.threads.pinned = true;
     }
 
-    /// Makes algorithms that are created from now on decide by counted work, and not by the clock: then they do the same
-    /// work in every run. For tests that count.
+    /// Makes algorithms that are created from now on decide by counted work, and not by the clock: then they do the
+    /// same work in every run. For tests that count.
     #[doc(hidden)]
     pub fn ignore_clock(&mut self) {
         self.threads.untimed = true;

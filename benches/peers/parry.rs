@@ -146,7 +146,7 @@ pub(crate) fn margin(b: &Aabb) -> f32 {
 /// is slower in `uniform` and `resting`.
 const OPTIMISE_EVERY: u32 = 5;
 
-/// The most boxes, one in so many, that may leave their leaves for a partial refit: it walks up from each.
+/// If more than one box in this many left its leaf, all nodes are refitted: a partial refit walks up from each.
 const PARTIAL: usize = 8;
 
 /// What is done with a leaf that its box has left.

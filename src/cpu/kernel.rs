@@ -166,13 +166,7 @@ trait Lanes: Copy {
     /// As above.
     #[inline(always)]
     unsafe fn write(self, view: &View<'_>, at: usize, id: u32, hits: u32, room: &mut [Pair]) {
-        let mut room = room.iter_mut();
-        each_bit(hits, |bit| {
-            let other = view.ids[at + bit];
-            if let Some(pair) = room.next() {
-                *pair = (id.min(other), id.max(other));
-            }
-        });
+        write_each(id, &view.ids[at..], hits, room);
     }
 }
 
@@ -235,6 +229,28 @@ fn brute<L: Lanes>(lanes: L, view: &View<'_>, rows: Range<usize>, pairs: &mut Pa
     }
 }
 
+/// Returns the lower and the upper bounds of a box, in lanes 0 to 2. Lane 3 is unspecified.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+pub(crate) fn corners(b: &Aabb) -> [std::arch::x86_64::__m128; 2] {
+    use std::arch::x86_64::*;
+    let at = std::ptr::from_ref(b).cast::<f32>();
+    // SAFETY: SSE2 is part of x86-64. The loads read floats 0 to 3 and 2 to 5 of an `Aabb`, which is `repr(C)`.
+    unsafe { [_mm_loadu_ps(at), _mm_castsi128_ps(_mm_srli_si128::<4>(_mm_castps_si128(_mm_loadu_ps(at.add(2)))))] }
+}
+
+/// Writes the pairs of a box with each of the others whose bit is set to the head of `room`.
+#[inline(always)]
+fn write_each(id: u32, others: &[u32], hits: u32, room: &mut [Pair]) {
+    let mut room = room.iter_mut();
+    each_bit(hits, |bit| {
+        let other = others[bit];
+        if let Some(pair) = room.next() {
+            *pair = (id.min(other), id.max(other));
+        }
+    });
+}
+
 /// Returns whether two boxes overlap, without the branches of [`Aabb::overlaps`]: no CPU predicts them if every other
 /// pair is a hit.
 #[inline(always)]
@@ -242,16 +258,10 @@ pub(crate) fn overlap(a: &Aabb, b: &Aabb) -> bool {
     #[cfg(target_arch = "x86_64")]
     {
         use std::arch::x86_64::*;
-        // SAFETY: SSE is part of x86-64. The loads read floats 0 to 3 and 2 to 5 of an `Aabb`, which is `repr(C)`.
+        let ([low_a, high_a], [low_b, high_b]) = (corners(a), corners(b));
+        // SAFETY: SSE is part of x86-64.
         unsafe {
-            let halves = |b: &Aabb| {
-                let at = std::ptr::from_ref(b).cast::<f32>();
-                (_mm_loadu_ps(at), _mm_loadu_ps(at.add(2)))
-            };
-            let ((low_a, high_a), (low_b, high_b)) = (halves(a), halves(b));
-            // Lower bounds stand in lanes 0 to 2 of the first half, upper ones in lanes 1 to 3 of the second.
-            let upper = |high: __m128| _mm_castsi128_ps(_mm_srli_si128::<4>(_mm_castps_si128(high)));
-            let meet = _mm_and_ps(_mm_cmple_ps(low_a, upper(high_b)), _mm_cmple_ps(low_b, upper(high_a)));
+            let meet = _mm_and_ps(_mm_cmple_ps(low_a, high_b), _mm_cmple_ps(low_b, high_a));
             _mm_movemask_ps(meet) & 7 == 7
         }
     }

@@ -8,6 +8,7 @@ mod grid_sap;
 mod helpers;
 mod kernel;
 mod level;
+mod mean_time;
 mod pair_cache;
 #[cfg(feature = "parallel")]
 mod phases;

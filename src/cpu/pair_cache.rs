@@ -3,8 +3,9 @@
 //!
 //! While every box stays within its grown box, every overlapping pair is among the pairs of grown boxes. So a frame
 //! costs one test of each box and one of each kept pair. A box that leaves its grown box gets a new one, and a tree of
-//! the grown boxes finds its new neighbours. After many of these, tree and list are rebuilt. If that takes longer than to find
-//! all pairs with a tree of the boxes themselves, by the clock, such a tree finds them until the boxes slow down.
+//! the grown boxes finds its new neighbours. After many of these, tree and list are rebuilt. If, by the clock, that
+//! takes longer than to find all pairs with a tree of the boxes themselves, such a tree finds them until the boxes slow
+//! down.
 //!
 //! Verlet (Phys. Rev. 159, 1967) kept such lists of neighbours for molecules.
 
@@ -134,8 +135,9 @@ impl BroadPhase for PairCache {
             upkeep.searched(searching, boxes.len());
             self.motion.found_from_scratch(boxes.len(), pairs.overlapping(), each(started), upkeep.built_ns());
             self.last_frame = FrameKind::FromScratch;
+        } else {
+            self.motion.found(boxes.len(), pairs.overlapping());
         }
-        self.motion.found(boxes.len(), pairs.overlapping());
         pairs.finish_on(&self.workers)
     }
 
@@ -212,7 +214,7 @@ impl PairCache {
         }
     }
 
-    /// Finds the pairs among the kept ones. `took` returns the nanoseconds of the frame so far, for each box.
+    /// Finds the pairs among the kept ones. `took` returns the nanoseconds since the frame began, for each box.
     fn keep(
         &mut self,
         plan: &FramePlan,

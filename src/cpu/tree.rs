@@ -4,7 +4,9 @@
 //! all 16. Dense places don't matter: if more than two leaves of boxes share a cell of the curve, a finer curve orders
 //! them. Nor do boxes as long as the world: the order has a part for each shape of oversized boxes. See [`curve`].
 
+mod codes;
 mod curve;
+mod order;
 mod upkeep;
 
 use crate::aabb::Aabb;
@@ -19,7 +21,8 @@ use crate::error::Error;
 use crate::filter::Filter;
 use crate::load::SceneStats;
 use crate::pairs::Pairs;
-use curve::{Curve, Order};
+use curve::Curve;
+use order::Order;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -111,7 +114,7 @@ impl Tree {
         workers.map(&sorted[..split], &mut before[..split], |_, &key| key as u32);
         workers.map(&sorted[split..], behind, |_, &key| key as u32);
         ids[*in_use..].fill(NOBODY);
-        self.fill(workers, boxes);
+        self.fill(workers, boxes, |_, _| true);
         Ok(())
     }
 
@@ -124,11 +127,12 @@ impl Tree {
         }
         // Behind fixed boxes stand no others, because pairs are only looked for from the leaves before them.
         let all_move = places.div_ceil(LANES) <= *moving;
-        let few = boxes.len() - before <= before / 4;
+        if !all_move || boxes.len() - before > before / 4 {
+            return false;
+        }
         let curve = Curve::over(&stats(), boxes.len() - before);
-        let members = Members::From(before);
-        // A build reports the error.
-        if !all_move || !few || order.sort(workers, boxes, members, &curve, None).is_err() {
+        if order.sort(workers, boxes, Members::From(before), &curve, None).is_err() {
+            // A build reports the error.
             return false;
         }
         let first = ids.len();
@@ -145,17 +149,16 @@ impl Tree {
     /// Gives each box of the tree its present bounds, and takes out those beyond the last one. Returns `false` if a box
     /// is invalid, or has become fixed or ceased to be; then the tree is of no use.
     fn refit(&mut self, workers: &Workers, boxes: &[Aabb], filter: Option<&Filter>) -> bool {
-        let same = |(place, &id): (usize, &u32)| {
-            id as usize >= boxes.len()
-                || filter.is_some_and(|f| f.is_fixed(id as usize)) == (place >= self.moving * LANES)
-        };
-        let known = filter.is_none() && self.places <= self.moving * LANES || self.ids.iter().enumerate().all(same);
-        known && self.fill(workers, boxes)
+        let fixed_from = self.moving * LANES;
+        if filter.is_none() && self.places <= fixed_from {
+            return self.fill(workers, boxes, |_, _| true);
+        }
+        self.fill(workers, boxes, |place, id| filter.is_some_and(|f| f.is_fixed(id)) == (place >= fixed_from))
     }
 
     /// Writes the bounds of all boxes to the leaves, and those of the leaves to the nodes above. Returns whether every
-    /// box is valid.
-    fn fill(&mut self, workers: &Workers, boxes: &[Aabb]) -> bool {
+    /// box is valid and `belongs` to its place.
+    fn fill(&mut self, workers: &Workers, boxes: &[Aabb], belongs: impl Fn(usize, usize) -> bool + Sync) -> bool {
         let Self { ids, levels, .. } = self;
         let used = levels.iter().rposition(|level| !level.is_empty()).map_or(0, |top| top + 1);
         let (leaves, above) = levels.split_at_mut(1);
@@ -163,9 +166,9 @@ impl Tree {
         let size = parents.len().div_ceil(workers.tasks()).max(SMALLEST_FILL);
         let parts =
             parents.chunks_mut(size).zip(leaves[0].chunks_mut(size * LANES)).zip(ids.chunks_mut(size * LANES * LANES));
-        let valid = AtomicBool::new(true);
-        workers.each_of(parts, |((parents, leaves), ids)| {
-            let mut all_valid = true;
+        let right = AtomicBool::new(true);
+        workers.each_of(parts.zip((0..).step_by(size * LANES * LANES)), |(((parents, leaves), ids), start)| {
+            let mut all_right = true;
             for (at, leaf) in leaves.iter_mut().enumerate() {
                 *leaf = Node::EMPTY;
                 let first = at * LANES;
@@ -175,23 +178,25 @@ impl Tree {
                     if let Some(next) = ids.get(first + lane + AHEAD).and_then(|&id| boxes.get(id as usize)) {
                         prefetch(next);
                     }
-                    let Some(b) = boxes.get(ids[first + lane] as usize) else {
+                    let id = ids[first + lane] as usize;
+                    let Some(b) = boxes.get(id) else {
                         ids[first + lane] = NOBODY;
                         continue;
                     };
                     leaf.set(lane, b);
                     bounds.add(b);
+                    all_right &= belongs(start + first + lane, id);
                 }
                 if at % LANES == 0 {
                     parents[at / LANES] = Node::EMPTY;
                 }
-                all_valid &= bounds.is_valid();
+                all_right &= bounds.is_valid();
                 if let Some(bounds) = bounds.get() {
                     parents[at / LANES].set(at % LANES, &bounds);
                 }
             }
-            if !all_valid {
-                valid.store(false, Relaxed);
+            if !all_right {
+                right.store(false, Relaxed);
             }
         });
         for level in 1..used.saturating_sub(1) {
@@ -201,7 +206,7 @@ impl Tree {
                 here[0][at / LANES].set(at % LANES, &node.bounds());
             }
         }
-        valid.into_inner()
+        right.into_inner()
     }
 
     /// Returns half the surface area of all leaves, whose edges count as at most `longest`.

@@ -1,5 +1,7 @@
 //! The bounds of boxes that are added one by one.
 
+#[cfg(target_arch = "x86_64")]
+use super::corners;
 use crate::aabb::Aabb;
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::*;
@@ -8,7 +10,7 @@ use std::arch::x86_64::*;
 #[cfg(target_arch = "x86_64")]
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Bounds {
-    /// Lower bounds in lanes 0 to 2, upper ones in lanes 1 to 3, and all bits of lanes 0 to 2 while all are valid.
+    /// Lower and upper bounds, and all bits while all boxes are valid, in lanes 0 to 2.
     low: __m128,
     high: __m128,
     valid: __m128,
@@ -40,12 +42,10 @@ impl Bounds {
     /// Adds a box.
     #[inline(always)]
     pub(crate) fn add(&mut self, b: &Aabb) {
-        let at = std::ptr::from_ref(b).cast::<f32>();
-        // SAFETY: SSE2 is part of x86-64. The loads read floats 0 to 3 and 2 to 5 of an `Aabb`, which is `repr(C)`.
+        let [low, high] = corners(b);
+        // SAFETY: SSE2 is part of x86-64.
         unsafe {
-            let (low, high) = (_mm_loadu_ps(at), _mm_loadu_ps(at.add(2)));
-            let upper = _mm_castsi128_ps(_mm_srli_si128::<4>(_mm_castps_si128(high)));
-            self.valid = _mm_and_ps(self.valid, _mm_cmple_ps(low, upper));
+            self.valid = _mm_and_ps(self.valid, _mm_cmple_ps(low, high));
             self.low = _mm_min_ps(self.low, low);
             self.high = _mm_max_ps(self.high, high);
         }
@@ -67,7 +67,7 @@ impl Bounds {
             _mm_storeu_ps(low.as_mut_ptr(), self.low);
             _mm_storeu_ps(high.as_mut_ptr(), self.high);
         }
-        let all = Aabb::new([low[0], low[1], low[2]], [high[1], high[2], high[3]]);
+        let all = Aabb::new([low[0], low[1], low[2]], [high[0], high[1], high[2]]);
         all.defect().is_none().then_some(all)
     }
 }

@@ -1,7 +1,7 @@
 //! Walks through a tree of nodes: finds the boxes that overlap a box, and the overlapping pairs.
 
 use super::node::{Group, LANES, Node};
-use super::prefetch;
+use super::{prefetch, write_each};
 use crate::aabb::Aabb;
 use crate::cpu::level::Simd;
 use crate::pair::Pair;
@@ -52,7 +52,12 @@ impl Walk<'_> {
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
             Simd::Avx2(_) => unsafe { x86::self_avx2(self, leaves, pairs) },
-            Simd::Portable => self.leaves_with_all_behind(leaves, Node::overlapping, write_each, pairs),
+            Simd::Portable => self.leaves_with_all_behind(
+                leaves,
+                Node::overlapping,
+                |i, j, hits, to| write_each(i, j, hits, to),
+                pairs,
+            ),
         }
     }
 
@@ -68,7 +73,9 @@ impl Walk<'_> {
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
             Simd::Avx2(_) => unsafe { x86::group_avx2(self, group, pairs) },
-            Simd::Portable => self.group_with_all(group, Node::overlapping, write_each, pairs),
+            Simd::Portable => {
+                self.group_with_all(group, Node::overlapping, |i, j, hits, to| write_each(i, j, hits, to), pairs);
+            }
         }
     }
 
@@ -218,18 +225,6 @@ fn add(id: u32, others: &[u32; LANES], hits: u32, write: impl Write, pairs: &mut
     } else {
         pairs.push_mask(id, others, hits);
     }
-}
-
-/// See [`Write`].
-#[inline(always)]
-fn write_each(id: u32, others: &[u32; LANES], hits: u32, room: &mut [Pair; LANES]) {
-    let mut room = room.iter_mut();
-    each_bit(hits, |bit| {
-        let other = others[bit];
-        if let Some(pair) = room.next() {
-            *pair = (id.min(other), id.max(other));
-        }
-    });
 }
 
 #[cfg(target_arch = "x86_64")]

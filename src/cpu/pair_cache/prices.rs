@@ -1,10 +1,9 @@
 //! What frames cost by the clock: with kept pairs, and from scratch.
 
+use crate::cpu::mean_time::MeanTime;
+
 /// Frames from scratch before pairs are kept: one that builds the tree, and two that may refit it.
 const FEWEST_FRAMES: u32 = 3;
-
-/// Frames over which a cost is averaged.
-const LEARNING: f32 = 8.0;
 
 /// Keeping is tried if it promises to cost at most this many times a frame from scratch: the promise is rough.
 const HOPE: f32 = 1.3;
@@ -22,10 +21,10 @@ const MOST_OF_FRAME: f32 = 4.0;
 pub(super) struct Prices {
     /// Without a clock, the model alone decides.
     timed: bool,
-    /// Frames from scratch so far.
+    /// Number of frames from scratch.
     frames: u32,
-    /// Of a frame from scratch as it was in the mean, and of one that builds its tree.
-    scratch: f32,
+    /// Of the mean frame from scratch, and of one that builds its tree.
+    scratch: MeanTime,
     built: f32,
     /// Cost of keeping beyond that of frames from scratch, in such frames, since it was last below.
     lost: f32,
@@ -33,15 +32,17 @@ pub(super) struct Prices {
 
 impl Prices {
     pub(super) fn new(timed: bool) -> Self {
-        Self { timed, frames: 0, scratch: 1.0, built: 1.0, lost: 0.0 }
+        Self { timed, frames: 0, scratch: MeanTime::default(), built: 1.0, lost: 0.0 }
     }
 
     /// Learns from a frame from scratch, of which the model says `model`. `built`: the time of one that builds.
     pub(super) fn add_scratch(&mut self, took: f32, built: Option<f32>, model: f32) {
         self.frames = self.frames.saturating_add(1);
-        let mean = |mean: f32, now: f32| mean + (now.min(2.0 * mean) - mean) / LEARNING;
         let now = took / model;
-        self.scratch = if self.frames < FEWEST_FRAMES { now } else { mean(self.scratch, now) };
+        if self.frames < FEWEST_FRAMES {
+            self.scratch = MeanTime::default();
+        }
+        self.scratch.add(f64::from(now));
         self.built = built.map_or(now, |built| built / model);
     }
 
@@ -50,7 +51,11 @@ impl Prices {
         if !self.timed {
             return keeping < scratch;
         }
-        self.frames >= FEWEST_FRAMES && keeping * self.built < HOPE * scratch * self.scratch
+        self.frames >= FEWEST_FRAMES && keeping * self.built < HOPE * scratch * self.of_scratch()
+    }
+
+    fn of_scratch(&self) -> f32 {
+        self.scratch.get().unwrap_or(1.0) as f32
     }
 
     /// Keeping begins.
@@ -63,7 +68,7 @@ impl Prices {
         if !self.timed {
             return keeping < scratch;
         }
-        let over = (took / (scratch * self.scratch)).min(MOST_OF_FRAME) - 1.0;
+        let over = (took / (scratch * self.of_scratch())).min(MOST_OF_FRAME) - 1.0;
         // NaN, of 0 over 0, counts as 0.
         self.lost = (self.lost + over).max(0.0);
         self.lost <= MOST_LOST

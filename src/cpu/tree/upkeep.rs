@@ -9,6 +9,7 @@
 use super::{Members, Tree};
 use crate::aabb::Aabb;
 use crate::clock::Instant;
+use crate::cpu::mean_time::MeanTime;
 use crate::cpu::workers::Workers;
 use crate::error::Error;
 use crate::filter::Filter;
@@ -17,16 +18,11 @@ use crate::load::SceneStats;
 /// Frames in which no refit is tried after one that was in vain, at most.
 const MOST_PAUSE: u32 = 64;
 
-/// Frames over which a time is averaged, and the most by which one frame may exceed the average: an interruption by the
-/// system says nothing.
-const LEARNING: f64 = 8.0;
-const MOST_RISE: f64 = 2.0;
-
 /// Places over boxes beyond which a tree has too many empty lanes.
 const MOST_PLACES: f64 = 4.0 / 3.0;
 
-/// What a build costs over a refit, in searches, without a clock. In `uniform` and `clustered` with 1000 to 100 000 boxes
-/// on the Zen 3 host of `datasets/` it was 0.8 to 1.8.
+/// What a build costs over a refit, in searches, without a clock. In `uniform` and `clustered` with 1000 to 100 000
+/// boxes on the Zen 3 host of `datasets/` it was 0.8 to 1.8.
 const NO_CLOCK: f64 = 1.0;
 
 /// See the module.
@@ -37,9 +33,10 @@ pub(crate) struct Upkeep {
     /// Frames until a refit is tried again, and their number after the next refit in vain.
     pause: u32,
     next_pause: u32,
-    build: Mean,
-    refit: Mean,
-    search: Mean,
+    /// Nanoseconds for each box.
+    build: MeanTime,
+    refit: MeanTime,
+    search: MeanTime,
     /// Whether measured times decide.
     timed: bool,
     #[cfg(test)]
@@ -57,21 +54,15 @@ struct Known {
     sum: f64,
 }
 
-/// Mean nanoseconds for each box over the last frames.
-#[derive(Debug, Clone, Copy, Default)]
-struct Mean(Option<f64>);
-
-impl Mean {
-    fn add(&mut self, since: Instant, boxes: usize) {
-        let now = since.elapsed().as_nanos() as f64 / boxes.max(1) as f64;
-        self.0 = Some(self.0.map_or(now, |mean| mean + (now.min(MOST_RISE * mean) - mean) / LEARNING));
-    }
+/// Returns the nanoseconds since then, for each box.
+fn each_ns(since: Instant, boxes: usize) -> f64 {
+    since.elapsed().as_nanos() as f64 / boxes.max(1) as f64
 }
 
 impl Upkeep {
     /// `timed`: measured times decide, and not areas alone.
     pub(crate) fn new(timed: bool) -> Self {
-        let [build, refit, search] = [Mean::default(); 3];
+        let [build, refit, search] = [MeanTime::default(); 3];
         Self {
             tree: None,
             pause: 0,
@@ -87,10 +78,10 @@ impl Upkeep {
 
     /// Returns the nanoseconds for each box of a frame that builds its tree.
     pub(crate) fn built_ns(&self) -> Option<f32> {
-        self.build.0.zip(self.search.0).map(|(build, search)| (build + search) as f32)
+        self.build.get().zip(self.search.get()).map(|(build, search)| (build + search) as f32)
     }
 
-    /// Returns the number of trees built so far.
+    /// Returns the number of trees that were built.
     #[cfg(test)]
     pub(crate) fn builds(&self) -> u64 {
         self.builds
@@ -120,7 +111,7 @@ impl Upkeep {
         let started = Instant::now();
         let stats = stats();
         tree.build(workers, boxes, Members::From(0), &stats, filter)?;
-        self.build.add(started, boxes.len());
+        self.build.add(each_ns(started, boxes.len()));
         #[cfg(test)]
         (self.builds += 1);
         let longest = (0..3).map(|a| stats.range(a).1).fold(0.0, f64::max) as f32;
@@ -131,7 +122,7 @@ impl Upkeep {
 
     /// Learns the time of a search.
     pub(crate) fn searched(&mut self, since: Instant, boxes: usize) {
-        self.search.add(since, boxes);
+        self.search.add(each_ns(since, boxes));
     }
 
     /// Refits the tree if that pays. If not, the tree is of no use.
@@ -167,7 +158,7 @@ impl Upkeep {
             self.next_pause = (2 * self.next_pause + 1).min(MOST_PAUSE);
             return false;
         }
-        self.refit.add(started, boxes.len());
+        self.refit.add(each_ns(started, boxes.len()));
         self.next_pause = 0;
         (known.boxes, known.sum) = (boxes.len(), known.sum + known.excess);
         self.tree = Some(known);
@@ -176,7 +167,7 @@ impl Upkeep {
 
     /// Returns what a build costs over a refit, in searches.
     fn price(&self) -> f64 {
-        match (self.build.0, self.refit.0, self.search.0) {
+        match (self.build.get(), self.refit.get(), self.search.get()) {
             (Some(build), refit, Some(search)) if self.timed && search > 0.0 => {
                 ((build - refit.unwrap_or(0.5 * build)) / search).clamp(0.05, 20.0)
             }

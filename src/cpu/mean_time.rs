@@ -1,0 +1,39 @@
+//! The mean of a time over the last frames.
+
+/// Frames over which the mean is taken, and the most by which one of them may exceed it: an interruption by the system
+/// says nothing.
+const FRAMES: f64 = 8.0;
+const MOST_RISE: f64 = 2.0;
+
+/// See the module.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct MeanTime(Option<f64>);
+
+impl MeanTime {
+    /// Adds the time of a frame.
+    pub(crate) fn add(&mut self, now: f64) {
+        self.0 = Some(self.0.map_or(now, |mean| mean + (now.min(MOST_RISE * mean) - mean) / FRAMES));
+    }
+
+    /// Returns the mean, `None` without a frame.
+    pub(crate) fn get(&self) -> Option<f64> {
+        self.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mean_follows_a_change_and_hardly_an_interruption() {
+        let mut mean = MeanTime::default();
+        assert_eq!(mean.get(), None);
+        mean.add(8.0);
+        assert_eq!(mean.get(), Some(8.0));
+        mean.add(1.0e9);
+        assert_eq!(mean.get(), Some(9.0));
+        (0..100).for_each(|_| mean.add(2.0));
+        assert!((mean.get().unwrap() - 2.0).abs() < 0.01);
+    }
+}
