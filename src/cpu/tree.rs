@@ -41,6 +41,9 @@ const AHEAD: usize = 16;
 /// Fewest nodes above the leaves that a task fills, with their 256 boxes each.
 const SMALLEST_FILL: usize = 4;
 
+/// Steps of a renewal in which codes are made, each for one part of the boxes.
+const RENEWAL_PARTS: usize = 4;
+
 /// See the module.
 #[derive(Debug)]
 pub(crate) struct Tree {
@@ -54,7 +57,29 @@ pub(crate) struct Tree {
     /// Leaves with boxes that may move. The leaves behind them hold fixed boxes.
     moving: usize,
     order: Order,
+    /// The curve of the present order.
+    curve: Option<Curve>,
+    renewal: Option<Renewal>,
+    /// Boxes that are being appended.
+    appended: Vec<u64>,
     simd: Simd,
+}
+
+/// A new order of all boxes, made in steps: codes of one part of the boxes after the other, then sorting, then a new
+/// arrangement of the leaves.
+#[derive(Debug)]
+struct Renewal {
+    curve: Curve,
+    boxes: usize,
+    step: usize,
+    /// Boxes that may move, once all are sorted.
+    moving: usize,
+}
+
+impl Renewal {
+    fn of(curve: Curve, boxes: usize) -> Self {
+        Self { curve, boxes, step: 0, moving: 0 }
+    }
 }
 
 /// The boxes of a frame that are in a tree.
@@ -77,7 +102,17 @@ impl Members<'_> {
 
 impl Tree {
     pub(crate) fn new(simd: Simd) -> Self {
-        Self { ids: Vec::new(), places: 0, levels: Vec::new(), moving: 0, order: Order::default(), simd }
+        Self {
+            ids: Vec::new(),
+            places: 0,
+            levels: Vec::new(),
+            moving: 0,
+            order: Order::default(),
+            curve: None,
+            renewal: None,
+            appended: Vec::new(),
+            simd,
+        }
     }
 
     /// Reserves memory for a tree of this many boxes.
@@ -98,9 +133,46 @@ impl Tree {
         stats: &SceneStats,
         filter: Option<&Filter>,
     ) -> Result<(), Error> {
-        let Self { ids, places: in_use, levels, moving, order, .. } = self;
         let curve = Curve::over(stats, members.len(boxes));
-        let split = order.sort(workers, boxes, members, &curve, filter)?;
+        let split = self.order.sort(workers, boxes, members, &curve, filter)?;
+        self.arrange(workers, boxes, curve, split)
+    }
+
+    /// Sorts all boxes anew, in several calls of which none takes long. Returns whether they stand in the new order
+    /// now. If the number of boxes has changed since the last call, this begins again.
+    pub(crate) fn renew(
+        &mut self,
+        workers: &Workers,
+        boxes: &[Aabb],
+        stats: impl FnOnce() -> SceneStats,
+        filter: Option<&Filter>,
+    ) -> Result<bool, Error> {
+        let (len, all) = (boxes.len(), Members::From(0));
+        let renewal = self.renewal.take().filter(|renewal| renewal.boxes == len);
+        let mut renewal = renewal.unwrap_or_else(|| Renewal::of(Curve::over(&stats(), len), len));
+        match renewal.step {
+            step @ 0..RENEWAL_PARTS => {
+                if step == 0 {
+                    self.order.begin(len)?;
+                }
+                self.order.code(workers, boxes, all, part(len, step, RENEWAL_PARTS), &renewal.curve, filter)?;
+            }
+            RENEWAL_PARTS => renewal.moving = self.order.finish(workers, boxes)?,
+            _ => return self.arrange(workers, boxes, renewal.curve, renewal.moving).map(|()| true),
+        }
+        renewal.step += 1;
+        self.renewal = Some(renewal);
+        Ok(false)
+    }
+
+    /// Returns whether [`renew`](Self::renew) has begun and not ended.
+    pub(crate) fn is_being_renewed(&self) -> bool {
+        self.renewal.is_some()
+    }
+
+    /// Puts the sorted boxes into leaves. The first `split` of them may move.
+    fn arrange(&mut self, workers: &Workers, boxes: &[Aabb], curve: Curve, split: usize) -> Result<(), Error> {
+        let Self { ids, places: in_use, levels, moving, order, .. } = self;
         let sorted = order.ids();
         // The fixed boxes begin a new leaf.
         *moving = split.div_ceil(LANES);
@@ -115,6 +187,7 @@ impl Tree {
         workers.map(&sorted[split..], behind, |_, &key| key as u32);
         ids[*in_use..].fill(NOBODY);
         self.fill(workers, boxes, |_, _| true);
+        (self.curve, self.renewal) = (Some(curve), None);
         Ok(())
     }
 
@@ -215,7 +288,7 @@ impl Tree {
     }
 
     /// Returns the number of places in use, those of removed boxes included.
-    fn places(&self) -> usize {
+    pub(crate) fn places(&self) -> usize {
         self.places
     }
 
@@ -249,22 +322,37 @@ impl Tree {
         &self.ids
     }
 
-    /// Adds a box without bounds behind all others, and returns its place.
-    pub(crate) fn append(&mut self, id: u32) -> Result<usize, Error> {
-        let place = self.places;
-        if place == self.ids.len() {
-            let places = (place / LANES + 1) * LANES;
-            grow(&mut self.ids, places, NOBODY)?;
-            let mut nodes = places / LANES;
-            // The last level grows beyond 16 nodes, so that no level has to be added.
-            for level in self.levels.iter_mut().take_while(|level| !level.is_empty()) {
-                grow(level, nodes, Node::EMPTY)?;
-                nodes = nodes.div_ceil(LANES);
-            }
+    /// Adds boxes behind all others, along the curve. They have no bounds yet. Calls `placed` with the place and the id
+    /// of each.
+    pub(crate) fn append(
+        &mut self,
+        boxes: &[Aabb],
+        ids: impl Iterator<Item = u32>,
+        mut placed: impl FnMut(usize, u32),
+    ) -> Result<(), Error> {
+        self.appended.clear();
+        self.appended.extend(ids.map(u64::from));
+        if self.appended.is_empty() {
+            return Ok(());
         }
-        self.ids[place] = id;
-        self.places += 1;
-        Ok(place)
+        if let Some(curve) = &self.curve {
+            curve.recode(&mut self.appended, boxes);
+            self.appended.sort_unstable();
+        }
+        let places = (self.places + self.appended.len()).next_multiple_of(LANES);
+        grow(&mut self.ids, places, NOBODY)?;
+        let mut nodes = places / LANES;
+        // The last level grows beyond 16 nodes, so that no level has to be added.
+        for level in self.levels.iter_mut().take_while(|level| !level.is_empty()) {
+            grow(level, nodes, Node::EMPTY)?;
+            nodes = nodes.div_ceil(LANES);
+        }
+        for (place, &key) in (self.places..).zip(&self.appended) {
+            self.ids[place] = key as u32;
+            placed(place, key as u32);
+        }
+        self.places += self.appended.len();
+        Ok(())
     }
 
     /// Removes the box at a place.

@@ -45,8 +45,8 @@ pub(super) struct Margin {
 pub(super) struct Share {
     /// Boxes that left their grown box.
     pub(super) left: Vec<u32>,
-    /// The number of them whose new grown box does not overlap the old one, new boxes included.
-    far_away: usize,
+    /// Those of them whose new grown box does not overlap the old one, new boxes included.
+    pub(super) far: Vec<u32>,
     error: Option<Error>,
 }
 
@@ -55,8 +55,6 @@ pub(super) struct Share {
 pub(super) struct Changes {
     /// Number of boxes that left their grown box, new and removed ones included.
     pub(super) left: usize,
-    /// Number of these that went far away or are new.
-    pub(super) far_away: usize,
     /// New boxes.
     pub(super) new: Range<usize>,
     /// Removed boxes.
@@ -88,7 +86,7 @@ impl Grown {
         self.len.div_ceil(tasks).next_multiple_of(64).max(64)
     }
 
-    /// Runs one phase: grows every box anew that has left its grown box or is no longer fixed.
+    /// Runs one phase: grows every box anew that has left its grown box or is no longer fixed, and those in `again`.
     ///
     /// # Errors
     /// [`Error::InvalidBox`]. Then the grown boxes are of no use.
@@ -97,6 +95,7 @@ impl Grown {
         workers: &Workers,
         boxes: &[Aabb],
         margin: Margin,
+        again: Range<usize>,
         filter: Option<&Filter>,
         shares: &mut [Share],
     ) -> Result<Changes, Error> {
@@ -105,12 +104,17 @@ impl Grown {
         if !new.is_empty() {
             self.boxes[new.clone()].fill(NOTHING);
         }
+        for b in &mut self.boxes[again] {
+            let centre = [0, 1, 2].map(|a| b.min[a] * 0.5 + b.max[a] * 0.5);
+            *b = Aabb::new(centre, centre);
+        }
         self.len = boxes.len();
         let size = self.share_len(shares.len());
         for share in shares.iter_mut() {
             // A task without a part in this frame must not report the previous one.
-            (share.far_away, share.error) = (0, None);
+            share.error = None;
             share.left.clear();
+            share.far.clear();
         }
         let simd = self.simd;
         let grown = (&mut self.boxes[..self.len], size);
@@ -126,7 +130,7 @@ impl Grown {
             self.flags[id / 64].dirty |= 1 << (id % 64);
         }
         let left = shares.iter().map(|s| s.left.len()).sum::<usize>() + gone.len();
-        Ok(Changes { left, far_away: shares.iter().map(|s| s.far_away).sum(), new, gone })
+        Ok(Changes { left, new, gone })
     }
 
     /// Runs one phase: grows every box anew. The boxes must be valid.
@@ -210,7 +214,9 @@ impl Share {
                     return;
                 }
                 let before = std::mem::replace(grown, margin.grow(b));
-                self.far_away += usize::from(!before.overlaps(grown));
+                if !before.overlaps(grown) {
+                    self.far.push((first + at + k) as u32);
+                }
                 flags[(at + k) / 64].dirty |= 1 << ((at + k) % 64);
                 self.left.push((first + at + k) as u32);
             }

@@ -10,6 +10,7 @@ use super::prices::Prices;
 use crate::aabb::Aabb;
 use crate::load::{Displacement, FramePlan, is_same_pace};
 use mean_work::MeanWork;
+use std::ops::Range;
 
 /// Margins that are compared, as shares of a mean edge.
 const MARGINS: [f32; 8] = [0.04, 0.07, 0.1, 0.15, 0.22, 0.33, 0.5, 0.75];
@@ -43,6 +44,15 @@ const MARGIN_STEP: f32 = 1.005;
 
 /// Of the boxes so many leave at once where the scene jumped, or where this method has not seen its last frames.
 const JUMP: f32 = 0.5;
+
+/// Places over boxes beyond which the tree has too many empty lanes.
+const MOST_PLACES: f32 = 4.0 / 3.0;
+
+/// Boxes that leave, as a share of all, from which it is learned how many nodes a good tree looks at.
+const FRESH: f32 = 0.02;
+
+/// Frames over which grown boxes that are too wide are made smaller.
+const SHRINKING: usize = 64;
 
 /// Frames after which keeping has paid: when it ceases to, that is because the scene changed.
 const PROVEN: u32 = 256;
@@ -110,8 +120,13 @@ struct Keeping {
     kept: f32,
     /// Nodes looked at for each box that left, averaged in the same way.
     nodes: f32,
-    /// Boxes that left since all were made again, over all boxes.
-    left: f32,
+    /// Nodes looked at, and the boxes that left, in the first frames after all boxes were sorted.
+    fresh: [f32; 2],
+    /// What looking at more nodes than then has cost for each box since. It is worth a new order when it has cost as
+    /// much as that does (the ski-rental bound).
+    excess: f32,
+    /// The first box that still has a grown box that is too wide.
+    wide_from: Option<usize>,
     /// The margin that the grown boxes have in the mean, and what half of it would have saved for each box since it
     /// would.
     grown: f32,
@@ -232,12 +247,40 @@ impl Motion {
         self.keeping.map_or(1.0, |k| k.work.last / k.work.mean())
     }
 
-    /// Whether the kept pairs are to be found again in this frame, in which boxes left as `changes` says.
-    pub(super) fn wants_rebuild(&self, objects: usize, changes: &Changes) -> bool {
+    /// Whether tree and pairs are made again in this frame, in which boxes left as `changes` says. `places`: of the
+    /// tree, those of removed boxes included.
+    pub(super) fn wants_rebuild(&self, objects: usize, changes: &Changes, places: usize) -> bool {
         let Some(keeping) = self.keeping else { return false };
-        let left = changes.left as f32 / objects.max(1) as f32;
-        // Pairs of boxes that left are found at a higher price and stand apart from their neighbours in space.
-        left > 0.2 || keeping.left + worn(objects, changes) > 1.5 || keeping.is_too_wide(objects)
+        changes.left as f32 > JUMP * objects as f32
+            || places as f32 > 2.0 * MOST_PLACES * objects as f32 + 64.0
+            || keeping.excess > cost::rebuild(cost::far(objects), keeping.kept)
+    }
+
+    /// Whether the boxes in the tree are to be sorted anew, over some frames.
+    /// `places`: of the tree, those of boxes that went elsewhere included.
+    pub(super) fn wants_renewal(&self, objects: usize, places: usize) -> bool {
+        places as f32 > MOST_PLACES * objects as f32 + 64.0
+            || self.keeping.is_some_and(|k| k.excess > cost::renewal(cost::far(objects)))
+    }
+
+    /// The boxes in the tree stand in a new order.
+    pub(super) fn renewed(&mut self) {
+        self.keeping.iter_mut().for_each(|k| (k.fresh, k.excess) = ([0.0; 2], 0.0));
+    }
+
+    /// Returns the boxes whose grown boxes are made smaller in this frame. When the margin is too wide they all are, a
+    /// few in each frame.
+    pub(super) fn next_to_shrink(&mut self, objects: usize) -> Range<usize> {
+        let Some(keeping) = self.keeping.as_mut().filter(|k| k.wide_from.is_some() || k.is_too_wide(objects)) else {
+            return 0..0;
+        };
+        let first = keeping.wide_from.unwrap_or_else(|| {
+            (keeping.margin.share, keeping.missed) = (keeping.narrower(), 0.0);
+            0
+        });
+        let end = (first + objects / SHRINKING + 1).min(objects);
+        keeping.wide_from = Some(end).filter(|&end| end < objects);
+        first.min(end)..end
     }
 
     /// The margin with which all boxes are grown again in a frame in which boxes left as `changes` says: the scene may
@@ -252,9 +295,6 @@ impl Motion {
         }
         let longest_edge = longest_edge(plan, boxes);
         self.keeping.as_mut().map_or(Margin { share: MARGINS[0], longest_edge }, |keeping| {
-            if keeping.is_too_wide(boxes.len()) {
-                keeping.margin.share = keeping.narrower();
-            }
             keeping.margin.longest_edge = longest_edge;
             keeping.margin
         })
@@ -279,9 +319,15 @@ impl Motion {
         // Boxes that move alike leave together, in frames in which all is made again.
         k.leaving += if k.frames > 0 { (left - k.leaving) / LEARNING } else { 0.0 };
         if rebuilt {
-            (k.left, k.grown, k.missed) = (0.0, k.margin.share, 0.0);
+            (k.grown, k.missed, k.wide_from) = (k.margin.share, 0.0, None);
+            (k.fresh, k.excess) = ([0.0; 2], 0.0);
         } else {
-            k.left += worn(objects, changes);
+            if share(k.fresh[1] as usize) < FRESH || k.fresh[1] < 64.0 {
+                k.fresh = [k.fresh[0] + did.nodes as f32, k.fresh[1] + changes.left as f32];
+            } else {
+                let more = cost::left(far, nodes) - cost::left(far, k.fresh[0] / k.fresh[1]);
+                k.excess = (k.excess + more * left).max(0.0);
+            }
             k.grown += (k.margin.share - k.grown) * left.min(1.0);
             k.nodes += if changes.left > 0 { (nodes - k.nodes) / LEARNING } else { 0.0 };
             k.missed = (k.missed + k.narrower_saves(far, kept, left)).max(0.0);
@@ -358,7 +404,9 @@ impl Motion {
             leaving: cost::leaving(motion, best),
             kept,
             nodes: NODES,
-            left: 0.0,
+            fresh: [0.0; 2],
+            excess: 0.0,
+            wide_from: None,
             grown: best,
             missed: 0.0,
             frames: 0,
@@ -370,11 +418,4 @@ impl Motion {
 /// Mean edges count as no longer than four times that which nine boxes in ten don't exceed.
 fn longest_edge(plan: &FramePlan, boxes: &[Aabb]) -> f32 {
     4.0 * (plan.stats(boxes).extent.iter().sum::<f64>() / 3.0) as f32
-}
-
-/// How much of the order in space is lost, as a share of the boxes that left. One that went far widens every node above
-/// its leaf, which then costs every query near there.
-fn worn(objects: usize, changes: &Changes) -> f32 {
-    const FAR_AWAY: f32 = 16.0;
-    (changes.left as f32 + FAR_AWAY * changes.far_away as f32) / objects.max(1) as f32
 }

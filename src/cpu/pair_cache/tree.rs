@@ -1,7 +1,7 @@
 //! The tree of the grown boxes, refitted for boxes that get a new one.
 //!
-//! A box that moves widens the nodes above its leaf and never changes its leaf, so the tree gets worse until it is
-//! rebuilt.
+//! A box that moves widens the nodes above its leaf and never changes its leaf, so the tree gets worse until its boxes
+//! are sorted anew.
 
 use crate::aabb::Aabb;
 use crate::cpu::columns::{ensure, part};
@@ -49,7 +49,33 @@ impl GrownTree {
         filter: Option<&Filter>,
     ) -> Result<(), Error> {
         self.tree.build(workers, boxes, Members::From(0), stats, filter)?;
-        ensure(&mut self.place_of, boxes.len(), "boxes in a tree")?;
+        self.note_places(boxes.len())
+    }
+
+    /// Goes on to sort all boxes anew if that has begun or is `wanted`. Returns whether they stand in the new order now.
+    pub(super) fn renew(
+        &mut self,
+        workers: &Workers,
+        boxes: &[Aabb],
+        filter: Option<&Filter>,
+        wanted: bool,
+    ) -> Result<bool, Error> {
+        let goes_on = wanted || self.tree.is_being_renewed();
+        let renewed = goes_on && self.tree.renew(workers, boxes, || SceneStats::of(boxes), filter)?;
+        if renewed {
+            self.note_places(boxes.len())?;
+        }
+        Ok(renewed)
+    }
+
+    /// Returns the number of places in use, those of removed boxes included.
+    pub(super) fn places(&self) -> usize {
+        self.tree.places()
+    }
+
+    /// Notes the place of each box.
+    fn note_places(&mut self, boxes: usize) -> Result<(), Error> {
+        ensure(&mut self.place_of, boxes, "boxes in a tree")?;
         for (place, &id) in self.tree.ids().iter().enumerate().filter(|&(_, &id)| id != NOBODY) {
             self.place_of[id as usize] = place as u32;
         }
@@ -66,11 +92,18 @@ impl GrownTree {
         self.tree.self_pairs(self.tree.part(k, parts), pairs);
     }
 
-    /// Adds a box, without bounds until [`refit`](Self::refit) sets them.
-    pub(super) fn insert(&mut self, id: u32) -> Result<(), Error> {
-        ensure(&mut self.place_of, id as usize + 1, "boxes in a tree")?;
-        self.place_of[id as usize] = self.tree.append(id)? as u32;
-        Ok(())
+    /// Moves boxes to new leaves, which have no bounds until [`refit`](Self::refit) sets them. Boxes from `new` on are
+    /// not in the tree yet.
+    pub(super) fn insert(
+        &mut self,
+        boxes: &[Aabb],
+        ids: impl Iterator<Item = u32> + Clone,
+        new: usize,
+    ) -> Result<(), Error> {
+        ensure(&mut self.place_of, boxes.len(), "boxes in a tree")?;
+        ids.clone().take_while(|&id| (id as usize) < new).for_each(|id| self.remove(id));
+        let place_of = &mut self.place_of;
+        self.tree.append(boxes, ids, |place, id| place_of[id as usize] = place as u32)
     }
 
     /// Removes a box.
@@ -125,9 +158,12 @@ impl GrownTree {
         Ok(())
     }
 
-    /// Returns part `k` of `parts` of the moved boxes, in the order of the tree.
+    /// Returns the moved boxes in part `k` of `parts` of the tree, in its order.
     pub(super) fn moved(&self, k: usize, parts: usize) -> impl Iterator<Item = u32> {
-        self.keys[part(self.moved, k, parts)].iter().map(|&key| key as u32)
+        let keys = &self.keys[..self.moved];
+        let places = part(self.tree.ids().len(), k, parts);
+        let [first, end] = [places.start, places.end].map(|at| keys.partition_point(|key| key >> 32 < at as u64));
+        keys[first..end].iter().map(|&key| key as u32)
     }
 
     /// Calls `found` for every box that overlaps these bounds. Returns the number of visited nodes.

@@ -55,9 +55,29 @@ impl Order {
         curve: &Curve,
         filter: Option<&Filter>,
     ) -> Result<usize, Error> {
-        self.len = members.len(boxes);
-        ensure(&mut self.keys, self.len, "sort keys")?;
-        let keys = &mut self.keys[..self.len];
+        let len = members.len(boxes);
+        self.begin(len)?;
+        self.code(workers, boxes, members, 0..len, curve, filter)?;
+        self.finish(workers, boxes)
+    }
+
+    /// Begins to sort this many members. [`code`](Self::code) of all of them and [`finish`](Self::finish) follow.
+    pub(super) fn begin(&mut self, members: usize) -> Result<(), Error> {
+        self.len = members;
+        ensure(&mut self.keys, members, "sort keys")
+    }
+
+    /// Makes the keys of a part of the members.
+    pub(super) fn code(
+        &mut self,
+        workers: &Workers,
+        boxes: &[Aabb],
+        members: Members<'_>,
+        part: Range<usize>,
+        curve: &Curve,
+        filter: Option<&Filter>,
+    ) -> Result<(), Error> {
+        let keys = &mut self.keys[part.clone()];
         let invalid = AtomicUsize::new(usize::MAX);
         let key = |id: usize, b: &Aabb| {
             let (code, valid) = curve.code(b);
@@ -68,11 +88,19 @@ impl Order {
             u64::from(code | fixed) << 32 | id as u64
         };
         match members {
-            Members::From(first) => workers.map(&boxes[first..], keys, |k, b| key(first + k, b)),
-            Members::Of(ids) => workers.map(ids, keys, |_, &id| key(id as usize, &boxes[id as usize])),
+            Members::From(first) => {
+                let first = first + part.start;
+                workers.map(&boxes[first..first + part.len()], keys, |k, b| key(first + k, b));
+            }
+            Members::Of(ids) => workers.map(&ids[part], keys, |_, &id| key(id as usize, &boxes[id as usize])),
         }
         let invalid = invalid.into_inner();
-        boxes.get(invalid..).map_or(Ok(()), |rest| Aabb::check(rest, invalid))?;
+        boxes.get(invalid..).map_or(Ok(()), |rest| Aabb::check(rest, invalid))
+    }
+
+    /// Sorts all keys. Returns the number of boxes that may move; they come first.
+    pub(super) fn finish(&mut self, workers: &Workers, boxes: &[Aabb]) -> Result<usize, Error> {
+        let keys = &mut self.keys[..self.len];
         sort(workers, keys, &mut self.scratch)?;
         let moving = keys.partition_point(|&key| code(key) < FIXED);
         self.sort_dense_cells(workers, boxes)?;

@@ -12,6 +12,9 @@ const LEFT: [f32; 2] = [60.0, 10.0];
 /// A box and a pair found by a tree from scratch.
 const SCRATCH: [f32; 2] = [40.0, 7.0];
 
+/// A box sorted and put into a leaf.
+const SORT: f32 = 25.0;
+
 /// The cost of a box from scratch.
 pub(super) fn scratch(far: f32, density: f32) -> f32 {
     far.sqrt() * (SCRATCH[0] + SCRATCH[1] * density)
@@ -21,6 +24,11 @@ pub(super) fn scratch(far: f32, density: f32) -> f32 {
 /// larger boxes.
 pub(super) fn rebuild(far: f32, kept: f32) -> f32 {
     1.5 * scratch(far, kept)
+}
+
+/// The cost of a box where all are sorted anew.
+pub(super) fn renewal(far: f32) -> f32 {
+    far.sqrt() * SORT
 }
 
 /// The cost of a box whose kept pairs are tested.

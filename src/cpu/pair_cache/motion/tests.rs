@@ -44,7 +44,7 @@ fn a_pause_ends_when_boxes_that_moved_too_far_come_to_rest() {
         let plan = |moved| FramePlan::default().with_moved(Some(moved)).with_pairs(Some(500.0));
         let mut motion = Motion::new(false);
         motion.advise(&plan(0.001), &boxes);
-        let changes = Changes { left: 0, far_away: 0, new: 0..0, gone: 0..0 };
+        let changes = Changes { left: 0, new: 0..0, gone: 0..0 };
         let did = Work { kept_pairs: 500, nodes: 0, rebuilt: false };
         assert!((0..kept).all(|_| motion.learn(1000, &changes, &did, 0.0)));
         motion.keeping.as_mut().unwrap().tests = 0.0;
@@ -66,7 +66,7 @@ fn a_pause_ends_when_boxes_that_moved_too_far_come_to_rest() {
 fn frames_that_others_ran_count_for_a_pause_and_end_it_where_boxes_have_come_to_rest_and_are_no_crowd() {
     let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
     let plan = |moved| FramePlan::default().with_moved(Some(moved)).with_pairs(Some(500.0));
-    let changes = Changes { left: 0, far_away: 0, new: 0..0, gone: 0..0 };
+    let changes = Changes { left: 0, new: 0..0, gone: 0..0 };
     let did = Work { kept_pairs: 500, nodes: 0, rebuilt: false };
     // Frames from scratch after so many of others, where boxes moved so far before and move so far now.
     let paused = |too_many: bool, missed: u64, moves: [f64; 2]| {
@@ -98,7 +98,7 @@ fn where_half_of_the_boxes_leave_at_once_the_margin_stays_unless_they_move_at_an
         // As found in many frames.
         motion.keeping.as_mut().unwrap().margin.share = 0.123;
         motion.advise(&plan(moved), &boxes);
-        let left = Changes { left: 600, far_away: 600, new: 400..1000, gone: 0..0 };
+        let left = Changes { left: 600, new: 400..1000, gone: 0..0 };
         motion.renew(&plan(moved), &boxes, &left).share
     };
     assert_eq!(share_after(0.021), 0.123);
@@ -106,24 +106,44 @@ fn where_half_of_the_boxes_leave_at_once_the_margin_stays_unless_they_move_at_an
 }
 
 #[test]
-fn boxes_that_go_far_wear_the_order_sooner_than_those_that_wander() {
+fn boxes_are_sorted_anew_when_queries_have_become_expensive() {
     let mut motion = Motion::new(false);
     let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
     motion.found(1000, 0);
     (0..2).for_each(|_| _ = motion.advise(&FramePlan::default(), &boxes));
-    let frames = |far_away: usize, motion: &mut Motion| {
-        let changes = Changes { left: 10, far_away, new: 0..0, gone: 0..0 };
-        let did = |rebuilt| Work { kept_pairs: 1000, nodes: 120, rebuilt };
-        motion.learn(1000, &changes, &did(true), 0.0);
-        (0..1000)
-            .take_while(|_| {
-                motion.learn(1000, &changes, &did(false), 0.0);
-                !motion.wants_rebuild(1000, &changes)
-            })
-            .count()
+    let changes = Changes { left: 10, new: 0..0, gone: 0..0 };
+    let did = |nodes: u64, rebuilt| Work { kept_pairs: 1000, nodes: nodes * 10, rebuilt };
+    motion.learn(1000, &changes, &did(0, true), 0.0);
+    let mut frames = |nodes: u64| {
+        (0..20).for_each(|_| _ = motion.learn(1000, &changes, &did(12, false), 0.0));
+        let wants = |_: &u32| {
+            motion.learn(1000, &changes, &did(nodes, false), 0.0);
+            !motion.wants_renewal(1000, 1000)
+        };
+        let frames = (0..1000).take_while(wants).count();
+        motion.renewed();
+        frames
     };
-    let (wandering, jumping) = (frames(0, &mut motion), frames(10, &mut motion));
-    assert!(wandering > 100 && jumping < 12, "{wandering} and {jumping} frames");
+    let [good, worse, bad] = [12, 24, 100].map(&mut frames);
+    assert!(good == 1000 && worse < 100 && bad < worse / 4, "{good}, {worse} and {bad} frames");
+    // Places of boxes that went elsewhere are empty.
+    assert!(!motion.wants_renewal(1000, 1200) && motion.wants_renewal(1000, 1500));
+}
+
+#[test]
+fn boxes_with_too_wide_a_margin_all_get_a_smaller_one_within_some_frames() {
+    let mut motion = Motion::new(false);
+    let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
+    motion.found(1000, 1000);
+    (0..2).for_each(|_| _ = motion.advise(&FramePlan::default(), &boxes));
+    let keeping = motion.keeping.as_mut().unwrap();
+    (keeping.margin.share, keeping.grown) = (0.4, 0.4);
+    assert!(motion.next_to_shrink(1000).is_empty());
+    motion.keeping.as_mut().unwrap().missed = 1.0e6;
+    let ranges: Vec<_> = (0..200).map(|_| motion.next_to_shrink(1000)).take_while(|r| !r.is_empty()).collect();
+    assert!((ranges[0].start, ranges[ranges.len() - 1].end) == (0, 1000) && ranges.iter().all(|r| r.len() < 20));
+    assert!(ranges.windows(2).all(|two| two[0].end == two[1].start));
+    assert_eq!(motion.keeping.unwrap().margin.share, 0.2);
 }
 
 #[test]
@@ -151,7 +171,7 @@ fn a_margin_that_keeps_too_many_pairs_is_halved_and_one_that_too_many_leave_is_n
             }
         };
         let first = keep(&mut motion);
-        let changes = Changes { left, far_away: 0, new: 0..0, gone: 0..0 };
+        let changes = Changes { left, new: 0..0, gone: 0..0 };
         let did = Work { kept_pairs, nodes: 12 * left as u64, rebuilt: false };
         assert!((0..100).any(|_| !motion.learn(1000, &changes, &did, 0.0)), "it never ceases to pay");
         motion.stop(false);
