@@ -181,13 +181,17 @@ fn most_of_list(most_kept: usize, tasks: usize) -> usize {
 
 impl PairCache {
     /// Takes as many threads of this width as a frame of `boxes` boxes keeps busy, with as many lists. They stay until
-    /// that number changes by a factor of two, because dealing the kept pairs out to other lists takes time.
+    /// that number changes by a factor of two, because dealing the kept pairs out to other lists takes time. Then what a
+    /// box costs is unknown, and nothing is kept.
     fn fit(&mut self, boxes: usize) {
         if self.fitted_for.is_some_and(|before| boxes <= 2 * before.max(1) && before <= 2 * boxes.max(1)) {
             return;
         }
         self.workers = self.widths[self.width].fit(boxes);
-        self.fitted_for = Some(boxes);
+        if self.fitted_for.replace(boxes).is_some() {
+            self.grown.forget();
+            self.motion.resize();
+        }
         let tasks = self.workers.tasks();
         let lists = tasks * boxes.div_ceil(tasks * BOXES_PER_LIST).max(1);
         if lists != self.kept.len() {
@@ -354,6 +358,17 @@ mod tests {
         assert_eq!(kinds(Scenario::Uniform, &unknown), [FromScratch, Rebuilt, Updated, Updated]);
         assert_eq!(kinds(Scenario::Uniform, &known), [Rebuilt, Updated, Updated, Updated]);
         assert_eq!(kinds(Scenario::Fast, &unknown), [FromScratch; 4]);
+    }
+
+    #[test]
+    fn nothing_is_kept_at_first_when_the_number_of_boxes_has_doubled() {
+        let mut method = pair_cache(&[1], &Threads::default(), Simd::Portable, true).unwrap();
+        let mut pairs = Pairs::new();
+        for (objects, frames) in [(400, 100), (1000, 3), (400, 3)] {
+            let scene = Scene::start(Scenario::Resting, objects, 1);
+            (0..frames).for_each(|_| method.find_pairs(scene.boxes(), &mut pairs).unwrap());
+            assert!(frames == 100 || method.last_frame().kind == FromScratch, "{objects}");
+        }
     }
 
     /// Returns the shift, in edges, of boxes that go one way for eight frames and then back.

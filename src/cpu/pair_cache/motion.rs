@@ -230,6 +230,12 @@ impl Motion {
         self.ends_early = !self.crowded;
     }
 
+    /// The number of boxes has changed by a factor of two or more: what a box costs is to be learned again.
+    pub(super) fn resize(&mut self) {
+        self.interrupt();
+        self.prices.forget();
+    }
+
     /// A frame failed for no fault of keeping.
     pub(super) fn interrupt(&mut self) {
         self.keeping = None;

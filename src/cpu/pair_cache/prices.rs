@@ -35,6 +35,11 @@ impl Prices {
         Self { timed, frames: 0, scratch: MeanTime::default(), built: 1.0, lost: 0.0 }
     }
 
+    /// Forgets all that was learned.
+    pub(super) fn forget(&mut self) {
+        *self = Self::new(self.timed);
+    }
+
     /// Learns from a frame from scratch, of which the model says `model`. `built`: the time of one that builds.
     pub(super) fn add_scratch(&mut self, took: f32, built: Option<f32>, model: f32) {
         self.frames = self.frames.saturating_add(1);
