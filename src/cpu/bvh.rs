@@ -45,7 +45,7 @@ impl BroadPhase for Bvh {
         let workers = &workers.fit(boxes.len());
         upkeep.update(tree, workers, boxes, || plan.stats(boxes), pairs.filter())?;
         let started = Instant::now();
-        outputs.find(workers, pairs, |k, parts, list| tree.self_pairs(tree.part(k, parts), list));
+        outputs.find(workers, pairs, |k, parts, list| tree.self_pairs(k, parts, list));
         upkeep.searched(started, boxes.len());
         pairs.finish_on(workers)
     }

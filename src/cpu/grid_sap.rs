@@ -138,7 +138,7 @@ impl BroadPhase for GridSap {
                 let strips = balanced(bins, strips, k, count)..balanced(bins, strips, k + 1, count);
                 task.error = task.find(bins, tree, grid.axis, strips, *simd, list).err();
                 if let Some(tree) = tree {
-                    tree.self_pairs(tree.part(k, count), list);
+                    tree.self_pairs(k, count, list);
                 }
             });
             tasks.iter_mut().find_map(|t| t.error.take()).map_or(Ok(()), Err)

@@ -3,10 +3,12 @@
 //! Sixteen boxes that are near in space share a leaf, sixteen leaves a node, and so on. One test compares a box with
 //! all 16. Dense places don't matter: if more than two leaves of boxes share a cell of the curve, a finer curve orders
 //! them. Nor do boxes as long as the world: the order has a part for each shape of oversized boxes. See [`curve`].
+//! Pairs of two shapes may be cheaper to find without the tree: see [`sweeps`].
 
 mod codes;
 mod curve;
 mod order;
+mod sweeps;
 mod upkeep;
 
 use crate::aabb::Aabb;
@@ -23,8 +25,8 @@ use crate::load::SceneStats;
 use crate::pairs::Pairs;
 use curve::Curve;
 use order::Order;
-use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use sweeps::{Kind, Sweeps};
 
 pub(crate) use upkeep::Upkeep;
 
@@ -56,6 +58,7 @@ pub(crate) struct Tree {
     levels: Vec<Vec<Node>>,
     /// Leaves with boxes that may move. The leaves behind them hold fixed boxes.
     moving: usize,
+    sweeps: Sweeps,
     order: Order,
     /// The curve of the present order.
     curve: Option<Curve>,
@@ -107,6 +110,7 @@ impl Tree {
             places: 0,
             levels: Vec::new(),
             moving: 0,
+            sweeps: Sweeps::default(),
             order: Order::default(),
             curve: None,
             renewal: None,
@@ -135,7 +139,9 @@ impl Tree {
     ) -> Result<(), Error> {
         let curve = Curve::over(stats, members.len(boxes));
         let split = self.order.sort(workers, boxes, members, &curve, filter)?;
-        self.arrange(workers, boxes, curve, split)
+        self.arrange(workers, boxes, curve, split)?;
+        self.sweep(workers, boxes);
+        Ok(())
     }
 
     /// Sorts all boxes anew, in several calls of which none takes long. Returns whether they stand in the new order
@@ -172,7 +178,7 @@ impl Tree {
 
     /// Puts the sorted boxes into leaves. The first `split` of them may move.
     fn arrange(&mut self, workers: &Workers, boxes: &[Aabb], curve: Curve, split: usize) -> Result<(), Error> {
-        let Self { ids, places: in_use, levels, moving, order, .. } = self;
+        let Self { ids, places: in_use, levels, moving, sweeps, order, .. } = self;
         let sorted = order.ids();
         // The fixed boxes begin a new leaf.
         *moving = split.div_ceil(LANES);
@@ -186,9 +192,21 @@ impl Tree {
         workers.map(&sorted[..split], &mut before[..split], |_, &key| key as u32);
         workers.map(&sorted[split..], behind, |_, &key| key as u32);
         ids[*in_use..].fill(NOBODY);
+        sweeps.begin(order.shapes().iter().map(|(long, at)| {
+            let by = if at.start < split { 0 } else { fixed_from - split };
+            Kind { long: *long, leaves: (at.start + by).div_ceil(LANES)..(at.end + by) / LANES }
+        }));
         self.fill(workers, boxes, |_, _| true);
         (self.curve, self.renewal) = (Some(curve), None);
         Ok(())
+    }
+
+    /// Chooses the pairs that are not found by walking through the tree.
+    fn sweep(&mut self, workers: &Workers, boxes: &[Aabb]) {
+        let Self { ids, levels, moving, sweeps, order, simd, .. } = self;
+        let tree = Walk { levels, ids, far: false, apart: &[] };
+        // Without memory for a sweep, the tree finds its pairs.
+        let _ = sweeps.choose(&tree, *moving, *simd, order, workers, boxes);
     }
 
     /// Makes room for the boxes from position `before` on, which are new, in leaves behind all others. Boxes beyond the
@@ -223,10 +241,15 @@ impl Tree {
     /// is invalid, or has become fixed or ceased to be; then the tree is of no use.
     fn refit(&mut self, workers: &Workers, boxes: &[Aabb], filter: Option<&Filter>) -> bool {
         let fixed_from = self.moving * LANES;
-        if filter.is_none() && self.places <= fixed_from {
-            return self.fill(workers, boxes, |_, _| true);
+        let right = if filter.is_none() && self.places <= fixed_from {
+            self.fill(workers, boxes, |_, _| true)
+        } else {
+            self.fill(workers, boxes, |place, id| filter.is_some_and(|f| f.is_fixed(id)) == (place >= fixed_from))
+        };
+        if right {
+            self.sweep(workers, boxes);
         }
-        self.fill(workers, boxes, |place, id| filter.is_some_and(|f| f.is_fixed(id)) == (place >= fixed_from))
+        right
     }
 
     /// Writes the bounds of all boxes to the leaves, and those of the leaves to the nodes above. Returns whether every
@@ -292,14 +315,11 @@ impl Tree {
         self.places
     }
 
-    /// Returns part `k` of `parts` of the leaves with boxes that may move. All pairs are found from these leaves.
-    pub(crate) fn part(&self, k: usize, parts: usize) -> Range<usize> {
-        part(self.moving, k, parts)
-    }
-
-    /// Adds the pairs of the boxes in these leaves with each other and with those in all leaves behind.
-    pub(crate) fn self_pairs(&self, leaves: Range<usize>, pairs: &mut Pairs) {
-        self.walk().self_pairs(self.simd, leaves, pairs);
+    /// Adds part `k` of `parts` of the pairs of its boxes with each other, without those of two fixed boxes.
+    pub(crate) fn self_pairs(&self, k: usize, parts: usize, pairs: &mut Pairs) {
+        // All pairs are found from the leaves with boxes that may move.
+        self.walk().self_pairs(self.simd, part(self.moving, k, parts), pairs);
+        self.sweeps.pairs(k, parts, pairs);
     }
 
     /// Adds the pairs of the boxes of a group with those in the tree. None of the group is in the tree.
@@ -314,7 +334,7 @@ impl Tree {
     }
 
     fn walk(&self) -> Walk<'_> {
-        Walk { levels: &self.levels, ids: &self.ids, far: self.ids.len() > FAR }
+        Walk { levels: &self.levels, ids: &self.ids, far: self.ids.len() > FAR, apart: self.sweeps.apart() }
     }
 
     /// Returns the box at each place: place `p` is lane `p % 16` of leaf `p / 16`.

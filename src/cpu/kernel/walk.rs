@@ -19,10 +19,25 @@ pub(crate) struct Walk<'a> {
     pub(crate) ids: &'a [u32],
     /// Whether to prefetch nodes: they are likely not in the cache.
     pub(crate) far: bool,
+    /// Leaves that are not compared with each other, ascending by `others`.
+    pub(crate) apart: &'a [Apart],
 }
+
+/// Leaves whose pairs with others behind them are found in another way.
+#[derive(Debug)]
+pub(crate) struct Apart {
+    pub(crate) leaves: Range<usize>,
+    pub(crate) others: Range<usize>,
+}
+
+/// Leaves of a range from which costs are estimated, at most.
+pub(crate) const SAMPLE: usize = 32;
 
 /// Levels of a tree of 2^32 boxes.
 const MOST_LEVELS: usize = 9;
+
+/// All lanes of a level.
+const EVERY: Range<usize> = 0..usize::MAX;
 
 impl Walk<'_> {
     /// Calls `found` for every place in the leaves whose box overlaps `b`. Returns the number of nodes compared with
@@ -36,7 +51,7 @@ impl Walk<'_> {
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
             Simd::Avx2(_) => unsafe { x86::each_avx2(self, b, found) },
-            Simd::Portable => self.each(b, 0, 0, Node::overlapping, found),
+            Simd::Portable => self.each(b, EVERY, 0, Node::overlapping, found),
         }
     }
 
@@ -98,9 +113,14 @@ impl Walk<'_> {
                 }
             }
             let bounds = self.bounds_of(leaf);
-            self.each(&bounds, leaf + 1, 1, overlapping, |other| {
-                self.meet((node, &bounds, ids), other, overlapping, write, pairs);
-            });
+            let mut from = leaf + 1;
+            let apart = self.apart.iter().filter(|apart| apart.leaves.contains(&leaf)).map(|apart| &apart.others);
+            for Range { start, end } in apart.chain([&(usize::MAX..usize::MAX)]) {
+                self.each(&bounds, from..*start, 1, overlapping, |other| {
+                    self.meet((node, &bounds, ids), other, overlapping, write, pairs);
+                });
+                from = *end;
+            }
             // A caller who wants a thousand pairs must not wait for all.
             if pairs.is_over() {
                 return;
@@ -116,7 +136,7 @@ impl Walk<'_> {
         write: impl Write,
         pairs: &mut Pairs,
     ) {
-        self.each(&group.bounds, 0, 1, overlapping, |other| {
+        self.each(&group.bounds, EVERY, 1, overlapping, |other| {
             self.meet((&group.node, &group.bounds, &group.ids), other, overlapping, write, pairs);
         });
     }
@@ -151,7 +171,27 @@ impl Walk<'_> {
         });
     }
 
-    fn bounds_of(&self, leaf: usize) -> Aabb {
+    /// Estimates the cost of the pairs of a box in `some` leaves with one in `others`: one for each two leaves that
+    /// meet, and one for each box of the first that meets the second.
+    pub(crate) fn tests(&self, some: Range<usize>, others: Range<usize>) -> u64 {
+        let step = some.len().div_ceil(SAMPLE).max(1);
+        let mut tests = 0;
+        for leaf in some.skip(step / 2).step_by(step) {
+            self.each(&self.bounds_of(leaf), others.clone(), 1, Node::overlapping, |other| {
+                let reach = Node::overlapping(&self.levels[0][leaf], &self.bounds_of(other));
+                tests += 1 + u64::from(reach.count_ones());
+            });
+        }
+        tests * step as u64
+    }
+
+    /// Returns the boxes of a leaf.
+    pub(crate) fn group(&self, leaf: usize) -> Group {
+        Group { node: self.levels[0][leaf], bounds: self.bounds_of(leaf), ids: *self.ids_of(leaf) }
+    }
+
+    /// Returns the bounds of a leaf: NaN if it is empty.
+    pub(crate) fn bounds_of(&self, leaf: usize) -> Aabb {
         self.levels[1][leaf / LANES].lane(leaf % LANES)
     }
 
@@ -159,26 +199,29 @@ impl Walk<'_> {
         &self.ids.as_chunks().0[leaf]
     }
 
-    /// Calls `found` for every lane of level `bottom`, from number `first` on, that overlaps a box. Lane k of node n
-    /// has the number 16 n + k. Returns the number of nodes compared with the box.
+    /// Calls `found` for every lane of level `bottom`, of those with these numbers, that overlaps a box. Lane k of node
+    /// n has the number 16 n + k. Returns the number of nodes compared with the box.
     #[inline(always)]
     fn each(
         &self,
         b: &Aabb,
-        first: usize,
+        Range { start, end }: Range<usize>,
         bottom: usize,
         overlapping: impl Fn(&Node, &Aabb) -> u32,
         mut found: impl FnMut(usize),
     ) -> u32 {
         let Some(top) = self.levels.iter().rposition(|level| !level.is_empty()) else { return 0 };
-        // The lanes of a node that contain something from `first` on.
+        // The lanes of a node that contain something of the range.
         let lanes = |level: usize, node: usize| {
-            let first = first >> (4 * (level - bottom));
-            let before = first.saturating_sub(node * LANES);
-            if before < LANES { u32::MAX << before } else { 0 }
+            let (above, first) = (4 * (level - bottom), node * LANES);
+            let before = (start >> above).saturating_sub(first);
+            let mask = if before < LANES { u32::MAX << before } else { 0 };
+            // Most ranges have no end.
+            let until = if end == usize::MAX { LANES } else { end.div_ceil(1 << above).saturating_sub(first) };
+            if until < LANES { mask & !(u32::MAX << until) } else { mask }
         };
         let mut looked = 0;
-        for root in (first >> (4 * (top - bottom) + 4))..self.levels[top].len() {
+        for root in (start >> (4 * (top - bottom) + 4))..self.levels[top].len() {
             // For each level: the node whose children are visited, and a mask of those left.
             let mut open = [(0, 0); MOST_LEVELS];
             let mut at = top;
@@ -229,7 +272,7 @@ fn add(id: u32, others: &[u32; LANES], hits: u32, write: impl Write, pairs: &mut
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use super::Walk;
+    use super::{EVERY, Walk};
     use crate::aabb::Aabb;
     use crate::cpu::kernel::node::{Group, Node};
     use crate::cpu::kernel::x86::{write_avx2, write_avx512};
@@ -274,12 +317,12 @@ mod x86 {
 
     #[target_feature(enable = "avx512f")]
     pub(super) fn each_avx512(walk: &Walk<'_>, b: &Aabb, found: impl FnMut(usize)) -> u32 {
-        walk.each(b, 0, 0, |node, b| overlapping_avx512(node, b), found)
+        walk.each(b, EVERY, 0, |node, b| overlapping_avx512(node, b), found)
     }
 
     #[target_feature(enable = "avx2")]
     pub(super) fn each_avx2(walk: &Walk<'_>, b: &Aabb, found: impl FnMut(usize)) -> u32 {
-        walk.each(b, 0, 0, |node, b| overlapping_avx2(node, b), found)
+        walk.each(b, EVERY, 0, |node, b| overlapping_avx2(node, b), found)
     }
 
     #[target_feature(enable = "avx512f")]
@@ -342,7 +385,7 @@ mod tests {
     #[test]
     fn every_level_finds_the_lanes_that_overlap() {
         let (boxes, levels, ids) = scene();
-        let walk = Walk { levels: &levels, ids: &ids, far: true };
+        let walk = Walk { levels: &levels, ids: &ids, far: true, apart: &[] };
         let infinite = Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]);
         let queries = (0..60).map(|k| Aabb::cube([(k % 34) as f32, (k % 13) as f32, (k % 11) as f32], 0.1 * k as f32));
         for query in queries.chain([infinite]) {
@@ -382,7 +425,7 @@ mod tests {
     #[test]
     fn every_level_finds_each_pair_once() {
         let (boxes, levels, ids) = scene();
-        let walk = Walk { levels: &levels, ids: &ids, far: false };
+        let walk = Walk { levels: &levels, ids: &ids, far: false, apart: &[] };
         let mut expected = Pairs::new();
         (0..300_u32).for_each(|j| {
             (0..j).filter(|&i| boxes[i as usize].overlaps(&boxes[j as usize])).for_each(|i| expected.push(i, j));
@@ -398,6 +441,15 @@ mod tests {
                 walk.self_pairs(simd, leaves, &mut found);
             }
             assert_eq!(found.fingerprint(), expected.fingerprint(), "{simd:?}");
+            let apart = [(0..3, 5..6), (2..9, 9..16), (2..4, 18..19)];
+            let apart = apart.map(|(leaves, others)| Apart { leaves, others });
+            let leaf = |id: u32| id as usize / LANES;
+            let compared = |i, j| !apart.iter().any(|a| a.leaves.contains(&leaf(i)) && a.others.contains(&leaf(j)));
+            let mut rest = Pairs::new();
+            expected.iter().filter(|&&(i, j)| compared(i, j)).for_each(|&(i, j)| rest.push(i, j));
+            found.clear();
+            Walk { apart: &apart, ..walk }.self_pairs(simd, 0..19, &mut found);
+            assert_eq!(found.fingerprint(), rest.fingerprint(), "{simd:?}");
             found.clear();
             walk.pairs_with(simd, &group, &mut found);
             assert!(

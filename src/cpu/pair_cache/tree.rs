@@ -89,7 +89,7 @@ impl GrownTree {
 
     /// Adds part `k` of `parts` of the pairs of all boxes that were in the tree when it was built.
     pub(super) fn self_pairs(&self, k: usize, parts: usize, pairs: &mut Pairs) {
-        self.tree.self_pairs(self.tree.part(k, parts), pairs);
+        self.tree.self_pairs(k, parts, pairs);
     }
 
     /// Moves boxes to new leaves, which have no bounds until [`refit`](Self::refit) sets them. Boxes from `new` on are

@@ -20,6 +20,10 @@ const OVERSIZED_BITS: u32 = 24;
 /// Steps by which oversized edges are told apart on each axis, and the least ratio of two of them.
 const STEPS: usize = 3;
 const CLASSES: usize = 64;
+
+/// The first class of each shape. The bits of a shape are the axes on which boxes are oversized, so a shape with k bits
+/// has 3^k classes.
+const SHAPES: [u32; 8] = [0, 1, 4, 7, 16, 19, 28, 37];
 const LEAST_STEP: f32 = 4.0;
 
 /// A cell is at most this many times as long on one axis as on another.
@@ -176,19 +180,28 @@ impl Curve {
         ([0, 1, 2].map(cell), [0, 1, 2].map(|a| b.max[a] - b.min[a]), b.defect().is_none())
     }
 
+    /// Returns the axes on which the boxes with this code are oversized, one bit each. Codes ascend with this number.
+    pub(super) fn long_axes(code: u32) -> u32 {
+        let class = code >> OVERSIZED_BITS & (CLASSES as u32 - 1);
+        if code & OVERSIZED == 0 { 0 } else { SHAPES.partition_point(|&first| first <= class) as u32 - 1 }
+    }
+
     /// Returns the code of an oversized box: its class, then its cell. The axis with the most cells comes first.
     #[cold]
     fn oversized(&self, b: &Aabb, edges: [f32; 3]) -> u32 {
         let steps = edges.map(|edge| self.steps.iter().filter(|&&step| edge > step).count());
-        let class = steps[0] << 4 | steps[1] << 2 | steps[2];
-        let Class { cells, axes, bits: [_, some, few] } = &self.classes.get_or_init(|| self.classes())[class];
+        let index = steps[0] << 4 | steps[1] << 2 | steps[2];
+        let long = (0..3).filter(|&a| steps[a] > 0);
+        let (shape, class) = long.fold((0, 0), |(shape, class), a| (shape | 1 << a, 3 * class + steps[a] as u32 - 1));
+        let class = SHAPES[shape] + class;
+        let Class { cells, axes, bits: [_, some, few] } = &self.classes.get_or_init(|| self.classes())[index];
         let cell = self.place(b, cells).0;
         let [x, y, z] = axes.map(|a| cell[a]);
         let below = |v: u32, bits: &u32| v & ((1 << bits) - 1);
         let low = spread3(below(x, few)) | spread3(below(y, few)) << 1 | spread3(below(z, few)) << 2;
         let middle = spread2(below(x, some) >> few) | spread2(below(y, some) >> few) << 1;
         let cell = (x >> some << (2 * (some - few)) | middle) << (3 * few) | low;
-        OVERSIZED | (class as u32) << OVERSIZED_BITS | below(cell, &OVERSIZED_BITS)
+        OVERSIZED | class << OVERSIZED_BITS | below(cell, &OVERSIZED_BITS)
     }
 
     /// Returns the cells of each class.
@@ -291,6 +304,23 @@ mod tests {
         let line = curve([1.0; 3], [0.0, 0.0, 4096.0]);
         assert!(line.finest == 2 && line.cells.density[2] == 1.0 && !line.hilbert);
         assert_eq!(curve([1.0; 3], [0.0; 3]).cells.density, [0.0; 4]);
+    }
+
+    #[test]
+    fn codes_ascend_by_shape_and_tell_classes_apart() {
+        let curve = Curve::through([0.0; 3], [100.0; 3], [1.0; 3], 1000);
+        let [a, b, c] = curve.steps.map(|step| step * 1.5);
+        let mut classes = Vec::new();
+        for class in 1..CLASSES {
+            let edges = [class >> 4, class >> 2 & 3, class & 3].map(|k| [0.1, a, b, c][k]);
+            let (code, _) = curve.code(&Aabb::new([50.0; 3], edges.map(|edge| 50.0 + edge)));
+            let long = (0..3).fold(0, |long, a| long | u32::from(edges[a] > 1.0) << a);
+            assert_eq!(Curve::long_axes(code), long, "{class}");
+            classes.push((long, code >> OVERSIZED_BITS));
+        }
+        classes.sort_unstable();
+        assert!(classes.is_sorted_by(|(_, a), (_, b)| a < b));
+        assert_eq!(Curve::long_axes(curve.code(&Aabb::cube([50.0; 3], 0.5)).0), 0);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::Members;
 use super::curve::{Curve, Spread};
 use crate::aabb::Aabb;
-use crate::cpu::columns::ensure;
+use crate::cpu::columns::{ensure, order_key};
 use crate::cpu::kernel::node::LANES;
 use crate::cpu::sort::sort;
 use crate::cpu::workers::Workers;
@@ -28,6 +28,9 @@ pub(super) struct Order {
     keys: Vec<u64>,
     len: usize,
     scratch: Vec<u64>,
+    /// Where the boxes of each shape stand, those that may move first: the axes on which they are oversized, one bit
+    /// each, and their places in the order.
+    shapes: Vec<(u32, Range<usize>)>,
     /// Dense cells that are not sorted yet: the large ones, and the others.
     large: Vec<Range<usize>>,
     small: Vec<Range<usize>>,
@@ -44,6 +47,30 @@ impl Order {
     /// Returns the sorted boxes: their positions are in the lower halves.
     pub(super) fn ids(&self) -> &[u64] {
         &self.keys[..self.len]
+    }
+
+    /// Returns where the boxes of each shape stand that were [sorted](Self::sort).
+    pub(super) fn shapes(&self) -> &[(u32, Range<usize>)] {
+        &self.shapes
+    }
+
+    /// Sorts the boxes at these positions by lower bound on an axis. The lower halves of the keys are places in
+    /// `members`. Members without a box come last.
+    pub(super) fn sort_along(
+        &mut self,
+        workers: &Workers,
+        boxes: &[Aabb],
+        members: &[u32],
+        axis: usize,
+    ) -> Result<(), Error> {
+        self.len = members.len();
+        ensure(&mut self.keys, self.len, "sort keys")?;
+        let keys = &mut self.keys[..self.len];
+        workers.map(members, keys, |at, &id| {
+            let low = boxes.get(id as usize).map_or(u32::MAX, |b| order_key(b.min[axis]));
+            u64::from(low) << 32 | at as u64
+        });
+        sort(workers, keys, &mut self.scratch)
     }
 
     /// Sorts the members. Returns the number of boxes that may move; they come first.
@@ -103,6 +130,16 @@ impl Order {
         let keys = &mut self.keys[..self.len];
         sort(workers, keys, &mut self.scratch)?;
         let moving = keys.partition_point(|&key| code(key) < FIXED);
+        self.shapes.clear();
+        for (keys, first) in [(&keys[..moving], 0), (&keys[moving..], moving)] {
+            let mut at = 0;
+            while at < keys.len() {
+                let shape = Curve::long_axes(code(keys[at]));
+                let end = at + keys[at..].partition_point(|&key| Curve::long_axes(code(key)) == shape);
+                self.shapes.push((shape, first + at..first + end));
+                at = end;
+            }
+        }
         self.sort_dense_cells(workers, boxes)?;
         Ok(moving)
     }
@@ -110,7 +147,7 @@ impl Order {
     /// Sorts the boxes of each dense cell along a curve through their own bounds, and so on with the dense cells of
     /// that curve.
     fn sort_dense_cells(&mut self, workers: &Workers, boxes: &[Aabb]) -> Result<(), Error> {
-        let Self { keys, len, scratch, large, small, spreads } = self;
+        let Self { keys, len, scratch, large, small, spreads, .. } = self;
         let keys = &mut keys[..*len];
         let mut note = |keys: &[u64], first: usize, large: &mut Vec<_>| {
             each_dense_cell(keys, |cell| {
