@@ -38,6 +38,7 @@ impl BroadPhase for Brute {
         self.columns.resize(boxes.len())?;
         let Self { workers, order, columns, outputs, simd } = self;
         let workers = &workers.fit(boxes.len().saturating_mul(boxes.len()) / (2 * PAIRS_PER_BOX));
+        let _frame = workers.frame();
         workers.check(boxes)?;
         let moving = moving_first(order, pairs.filter(), boxes.len())?;
         workers.fill(columns.as_mut(), |first, mut part| {

@@ -43,6 +43,7 @@ impl BroadPhase for Bvh {
         check_count(boxes.len())?;
         let Self { workers, tree, upkeep, outputs } = self;
         let workers = &workers.fit(boxes.len());
+        let _frame = workers.frame();
         upkeep.update(tree, workers, boxes, || plan.stats(boxes), pairs.filter())?;
         let started = Instant::now();
         outputs.find(workers, pairs, |k, parts, list| tree.self_pairs(k, parts, list));

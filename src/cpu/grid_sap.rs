@@ -116,6 +116,7 @@ impl BroadPhase for GridSap {
         let Self { workers, bins, apart, tree, tasks, outputs, simd } = self;
         let (grid, filter) = (plan.grid(boxes), pairs.filter());
         let workers = &workers.fit(boxes.len());
+        let _frame = workers.frame();
         let threads = workers.threads();
         let (bins, tasks) = (&mut bins[..threads], &mut tasks[..workers.tasks()]);
         workers.each(bins, |k, bin| {

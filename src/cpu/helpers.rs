@@ -5,6 +5,10 @@ use crate::cpu::placement::CpuPlacement;
 use crate::error::Unavailable;
 use std::sync::Arc;
 
+/// Rounds of spinning in which a helper waits for the next phase of a frame: about 60 µs. The serial work between two
+/// phases rarely takes longer.
+const LINGER: u32 = 2000;
+
 /// A pool of helpers: ours, or the program's.
 #[derive(Debug)]
 pub(crate) struct Helpers {
@@ -42,32 +46,45 @@ impl Helpers {
         Self { pool, shared: Arc::new(Shared { phases: Phases::default(), placement }), may_call }
     }
 
+    /// Begins a frame with up to `count` helpers, who stay between its phases until [`end_frame`](Self::end_frame).
+    pub(crate) fn begin_frame(&self, count: usize) {
+        self.shared.phases.begin_frame(count.min(self.most()), || self.invite());
+    }
+
+    /// Ends a frame.
+    pub(crate) fn end_frame(&self) {
+        self.shared.phases.end_frame();
+    }
+
     /// Runs `work` here and on up to `count` helpers that come while it lasts. Returns when nobody works on it any
-    /// more.
-    ///
-    /// A caller that is a thread of the pool can't help itself, so there is one helper less. It runs no other job of
-    /// its pool meanwhile.
+    /// more. The caller runs no other job of its pool meanwhile.
     pub(crate) fn run(&self, count: usize, work: &(dyn Fn() + Sync)) {
-        if let Some(placement) = &self.shared.placement {
+        let most = self.most();
+        self.shared.phases.run(count.min(most), most, work, || self.invite());
+    }
+
+    /// Returns the most helpers of the calling thread. One that is a thread of the pool can't help itself.
+    fn most(&self) -> usize {
+        self.pool.current_num_threads() - usize::from(self.may_call && self.pool.current_thread_index().is_some())
+    }
+
+    fn invite(&self) {
+        let shared = Arc::clone(&self.shared);
+        if let Some(placement) = &shared.placement {
             placement.follow_caller();
         }
-        let most = self.pool.current_num_threads();
-        let most = if self.may_call && self.pool.current_thread_index().is_some() { most - 1 } else { most };
-        self.shared.phases.run(count.min(most), most, work, || {
-            let shared = Arc::clone(&self.shared);
-            self.pool.spawn(move || {
-                if let Some(placement) = &shared.placement {
-                    placement.make_way();
-                }
-                shared.phases.join();
-            });
+        self.pool.spawn(move || {
+            if let Some(placement) = &shared.placement {
+                placement.make_way();
+            }
+            shared.phases.join(LINGER);
         });
     }
 
-    /// Returns the invitations that no helper has taken yet.
+    /// Returns the invitations that no helper has taken yet, and the helpers that linger.
     #[cfg(test)]
-    pub(crate) fn invited(&self) -> usize {
-        self.shared.phases.invited()
+    pub(crate) fn coming(&self) -> usize {
+        self.shared.phases.coming()
     }
 }
 
@@ -149,7 +166,7 @@ mod tests {
         for _ in 0..1000 {
             helpers.run(2, &|| _ = worked.fetch_add(1, Relaxed));
         }
-        assert_eq!((worked.load(Relaxed), helpers.invited()), (1000, 2));
+        assert_eq!((worked.load(Relaxed), helpers.coming()), (1000, 2));
         drop(gates);
         // The old invitations serve a phase that comes later.
         assert_eq!(working(&helpers, 2, 3).len(), 3);

@@ -109,6 +109,7 @@ impl BroadPhase for PairCache {
         pairs.clear();
         check_count(boxes.len())?;
         self.fit(boxes.len());
+        let _frame = self.workers.frame();
         let started = Instant::now();
         let each = |since: Instant| since.elapsed().as_nanos() as f32 / boxes.len().max(1) as f32;
         let kept = match self.motion.advise(plan, boxes) {
@@ -261,7 +262,7 @@ impl PairCache {
             if tree.renew(workers, grown.as_slice(), pairs.filter(), wanted)? {
                 motion.renewed();
             }
-            tree.refit(workers, grown.as_slice(), shares.iter().flat_map(|s| s.left.iter().copied()))?;
+            tree.refit(workers, grown.as_slice(), shares.iter().map(|s| &s.left[..]))?;
         }
         let (grown, tree) = (&*grown, &*tree);
         let sift =

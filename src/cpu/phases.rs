@@ -6,20 +6,29 @@
 //! list of open phases, under its lock, and is counted from then on. When nothing is left to do, the caller takes its
 //! phase off the list and waits for the counted helpers only.
 //!
+//! A frame is several phases. Waking a thread takes longer than many of them, so helpers linger between the phases of a
+//! frame: they spin, for a bounded time, until the next phase opens or the frame ends.
+//!
 //! This needs `unsafe`: a closure that borrows stands in a shared list. Safe code has only scopes, which wait for jobs
 //! that never ran.
 
+// The model checker runs the tests with its own threads.
+#[cfg(all(test, shuttle))]
+use shuttle::{hint, sync};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::PoisonError;
+#[cfg(not(all(test, shuttle)))]
+use std::{hint, sync};
+use sync::atomic::{AtomicUsize, Ordering};
+use sync::{Arc, Condvar, Mutex, MutexGuard};
 
 /// Work of caller and helpers: each calls it once, and it returns when nothing is left to do.
 type Work<'a> = &'a (dyn Fn() + Sync);
 
 /// Rounds in which the caller spins for its helpers before it sleeps: about 20 µs. Waking it takes longer than most
 /// tasks have left by then.
-const SPINS: u32 = 1000;
+const SPINS: u32 = if cfg!(all(test, shuttle)) { 2 } else { 1000 };
 
 /// In [`Latch::state`]: the caller sleeps.
 const ASLEEP: usize = 1;
@@ -30,6 +39,8 @@ const HELPER: usize = 2;
 #[derive(Default)]
 pub(crate) struct Phases {
     list: Mutex<List>,
+    /// Changes, under the lock of the list, when a phase opens and when a frame ends. Helpers that linger watch it.
+    news: AtomicUsize,
 }
 
 #[derive(Default)]
@@ -37,8 +48,12 @@ struct List {
     open: Vec<Open>,
     /// Latches of phases that are over, for reuse: a frame allocates none.
     spare: Vec<Arc<Latch>>,
-    /// Invitations that no helper has taken yet. They name no phase, so an old one serves a new phase.
-    invited: usize,
+    /// Helpers that will look for a phase: those who linger, and one for each invitation that is not taken yet. An
+    /// invitation names no phase, so an old one serves a new phase.
+    coming: usize,
+    /// Frames that are open, and the number of those that have ended.
+    frames: usize,
+    ended: usize,
 }
 
 /// A phase that can be joined.
@@ -61,6 +76,25 @@ struct Latch {
 }
 
 impl Phases {
+    /// Begins a frame and invites up to `helpers` helpers, who linger until it ends. `invite` makes one
+    /// [come](Self::join) at some time, or never.
+    pub(crate) fn begin_frame(&self, helpers: usize, invite: impl Fn()) {
+        let missing = {
+            let mut list = self.list();
+            list.frames += 1;
+            list.missing(helpers)
+        };
+        (0..missing).for_each(|_| invite());
+    }
+
+    /// Ends a frame: helpers that linger leave.
+    pub(crate) fn end_frame(&self) {
+        let mut list = self.list();
+        list.frames -= 1;
+        list.ended = list.ended.wrapping_add(1);
+        self.news.fetch_add(1, Ordering::Relaxed);
+    }
+
     /// Runs `work` here and on up to `helpers` helpers that come while it lasts. `invite` makes one [come](Self::join)
     /// at some time, or never; at most `most` are on their way at once. Returns when nobody works on it any more.
     ///
@@ -78,10 +112,9 @@ impl Phases {
         let missing = {
             let mut list = self.list();
             list.open.push(Open { work: work_for_helpers, vacant: helpers, latch: Arc::clone(&latch) });
-            let wanted = list.open.iter().map(|open| open.vacant).sum::<usize>().min(most);
-            let missing = wanted.saturating_sub(list.invited);
-            list.invited += missing;
-            missing
+            self.news.fetch_add(1, Ordering::Relaxed);
+            let vacant = list.open.iter().map(|open| open.vacant).sum::<usize>();
+            list.missing(vacant.min(most))
         };
         (0..missing).for_each(|_| invite());
         work();
@@ -93,38 +126,64 @@ impl Phases {
         }
     }
 
-    /// Works on the phase that has been open the longest and lacks helpers, if there is one. Call this once for each
-    /// invitation.
-    pub(crate) fn join(&self) {
-        let joined = {
-            let mut list = self.list();
-            list.invited -= 1;
-            list.open.iter_mut().find(|open| open.vacant > 0).map(|open| {
-                open.vacant -= 1;
-                open.latch.state.fetch_add(HELPER, Ordering::Relaxed);
-                (open.work, Arc::clone(&open.latch))
-            })
-        };
-        let Some((work, latch)) = joined else { return };
-        // The caller works on after a panic here, and resumes it when all is done.
-        let mut end = catch_unwind(AssertUnwindSafe(work));
-        if end.is_err() {
-            let mut first = lock(&latch.panic);
-            if first.is_none() {
-                *first = std::mem::replace(&mut end, Ok(())).err();
+    /// Works on one phase after the other: each time on the one that has been open the longest and lacks helpers.
+    /// Lingers for at most `rounds` rounds if there is none, but only in a frame, and only until one ends. Call this
+    /// once for each invitation.
+    pub(crate) fn join(&self, rounds: u32) {
+        let mut list = self.list();
+        let (in_frame, ended) = (list.frames > 0, list.ended);
+        let mut patient = true;
+        loop {
+            if let Some((work, latch)) = list.enter() {
+                drop(list);
+                latch.catch_panic(work);
+                list = self.list();
+                // Before it leaves the phase: then the caller need not invite another one to the next phase.
+                list.coming += 1;
+                patient = true;
+                latch.leave();
+            } else if patient && in_frame && list.ended == ended {
+                let seen = self.news.load(Ordering::Relaxed);
+                drop(list);
+                patient = (0..rounds).any(|_| {
+                    hint::spin_loop();
+                    self.news.load(Ordering::Relaxed) != seen
+                });
+                list = self.list();
+            } else {
+                // Under the lock under which it has found no phase: whoever opens one now does not count on it.
+                list.coming -= 1;
+                return;
             }
         }
-        latch.leave();
     }
 
     fn list(&self) -> MutexGuard<'_, List> {
         lock(&self.list)
     }
 
-    /// Returns the invitations that no helper has taken yet.
+    /// Returns the invitations that no helper has taken yet, and the helpers that linger.
     #[cfg(test)]
-    pub(crate) fn invited(&self) -> usize {
-        self.list().invited
+    pub(crate) fn coming(&self) -> usize {
+        self.list().coming
+    }
+}
+
+impl List {
+    /// Returns the helpers to invite so that `wanted` are coming, and counts them.
+    fn missing(&mut self, wanted: usize) -> usize {
+        let missing = wanted.saturating_sub(self.coming);
+        self.coming += missing;
+        missing
+    }
+
+    /// Counts a coming helper in with the phase that has been open the longest and lacks helpers, if there is one.
+    fn enter(&mut self) -> Option<(Work<'static>, Arc<Latch>)> {
+        let open = self.open.iter_mut().find(|open| open.vacant > 0)?;
+        open.vacant -= 1;
+        open.latch.state.fetch_add(HELPER, Ordering::Relaxed);
+        self.coming -= 1;
+        Some((open.work, Arc::clone(&open.latch)))
     }
 }
 
@@ -142,6 +201,17 @@ impl Drop for Joinable<'_> {
 }
 
 impl Latch {
+    /// Works, and keeps the first panic: the caller works on and resumes it when all is done.
+    fn catch_panic(&self, work: Work<'_>) {
+        let mut end = catch_unwind(AssertUnwindSafe(work));
+        if end.is_err() {
+            let mut first = lock(&self.panic);
+            if first.is_none() {
+                *first = std::mem::replace(&mut end, Ok(())).err();
+            }
+        }
+    }
+
     /// Counts a helper off. The last one wakes the caller if it sleeps.
     fn leave(&self) {
         if self.state.fetch_sub(HELPER, Ordering::AcqRel) == HELPER | ASLEEP {
@@ -157,7 +227,7 @@ impl Latch {
             if self.state.load(Ordering::Acquire) == 0 {
                 return;
             }
-            std::hint::spin_loop();
+            hint::spin_loop();
         }
         self.state.fetch_or(ASLEEP, Ordering::AcqRel);
         let mut held = lock(&self.panic);
@@ -179,7 +249,10 @@ impl std::fmt::Debug for Phases {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, shuttle))]
+mod checked;
+
+#[cfg(all(test, not(shuttle)))]
 mod tests {
     use super::*;
     use std::sync::atomic::AtomicBool;
@@ -218,7 +291,7 @@ mod tests {
                         if came.is_err() {
                             return;
                         }
-                        phases.join();
+                        phases.join(0);
                     }
                 });
             }
@@ -236,7 +309,7 @@ mod tests {
             });
             drop(invite);
         });
-        assert_eq!((phases.invited(), phases.list().open.len()), (0, 0));
+        assert_eq!((phases.coming(), phases.list().open.len()), (0, 0));
     }
 
     #[test]
@@ -246,11 +319,11 @@ mod tests {
         for _ in 0..100 {
             phases.run(3, 2, &work, || _ = asked.fetch_add(1, Ordering::Relaxed));
         }
-        assert_eq!((asked.load(Ordering::Relaxed), phases.invited(), worked.load(Ordering::Relaxed)), (2, 2, 100));
+        assert_eq!((asked.load(Ordering::Relaxed), phases.coming(), worked.load(Ordering::Relaxed)), (2, 2, 100));
         // They come now, and find nothing.
-        phases.join();
-        phases.join();
-        assert_eq!((phases.invited(), worked.load(Ordering::Relaxed)), (0, 100));
+        phases.join(0);
+        phases.join(0);
+        assert_eq!((phases.coming(), worked.load(Ordering::Relaxed)), (0, 100));
     }
 
     /// The helper goes on only when the caller is asleep or about to be.
@@ -277,7 +350,7 @@ mod tests {
                     (0..2000).for_each(|_| thread::yield_now());
                     left.store(true, Ordering::Release);
                 };
-                phases.run(1, 1, &work, || _ = scope.spawn(move || phases.join()));
+                phases.run(1, 1, &work, || _ = scope.spawn(move || phases.join(0)));
                 assert!(left.load(Ordering::Acquire));
             });
         }
@@ -288,7 +361,7 @@ mod tests {
         let phases = Phases::default();
         let caller = thread::current().id();
         for on_caller in [false, true] {
-            let both = std::sync::Barrier::new(2);
+            let both = sync::Barrier::new(2);
             let here = AtomicBool::new(false);
             let caught = thread::scope(|scope| {
                 let phases = &phases;
@@ -297,13 +370,13 @@ mod tests {
                     assert!((thread::current().id() == caller) != on_caller, "a task panics");
                     here.store(true, Ordering::Relaxed);
                 };
-                catch_unwind(AssertUnwindSafe(|| phases.run(1, 1, &work, || _ = scope.spawn(move || phases.join()))))
+                catch_unwind(AssertUnwindSafe(|| phases.run(1, 1, &work, || _ = scope.spawn(move || phases.join(0)))))
             });
             assert_eq!(caught.unwrap_err().downcast_ref(), Some(&"a task panics"));
             assert!(here.into_inner(), "the other went on");
-            assert_eq!((phases.invited(), phases.list().open.len()), (0, 0));
+            assert_eq!((phases.coming(), phases.list().open.len()), (0, 0));
         }
         // The panics are forgotten.
-        phases.run(1, 1, &|| (), || phases.join());
+        phases.run(1, 1, &|| (), || phases.join(0));
     }
 }

@@ -51,6 +51,7 @@ impl BroadPhase for Sap {
         let axis = plan.stats(boxes).sweep_axis();
         let Self { workers, keys, scratch, columns, outputs, simd } = self;
         let workers = &workers.fit(boxes.len());
+        let _frame = workers.frame();
         workers.check(boxes)?;
         let keys = &mut keys[..boxes.len()];
         workers.map(boxes, keys, |id, b| u64::from(order_key(b.min[axis])) << 32 | id as u64);

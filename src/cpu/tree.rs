@@ -381,9 +381,9 @@ impl Tree {
         self.ids[place] = NOBODY;
     }
 
-    /// Returns the leaves, and the levels above them from the lowest on.
-    pub(crate) fn levels_mut(&mut self) -> Option<(&mut Vec<Node>, &mut [Vec<Node>])> {
-        self.levels.split_first_mut()
+    /// Returns the levels: the leaves, their parents, and so on.
+    pub(crate) fn levels_mut(&mut self) -> &mut [Vec<Node>] {
+        &mut self.levels
     }
 }
 

@@ -25,6 +25,23 @@ pub struct Workers {
     helpers: Option<Arc<Helpers>>,
 }
 
+/// A frame in progress. Dropping it sends the helpers away.
+#[must_use]
+#[derive(Debug)]
+pub struct Frame {
+    #[cfg(feature = "parallel")]
+    helpers: Option<Arc<Helpers>>,
+}
+
+#[cfg(feature = "parallel")]
+impl Drop for Frame {
+    fn drop(&mut self) {
+        if let Some(helpers) = &self.helpers {
+            helpers.end_frame();
+        }
+    }
+}
+
 /// Tasks for each thread: enough to even out tasks of unequal length, few enough to cost nothing.
 const TASKS_PER_THREAD: usize = 8;
 
@@ -78,6 +95,18 @@ impl Workers {
             tasks: if threads == 1 { 1 } else { (threads * TASKS_PER_THREAD).min(boxes / SMALLEST_TASK) },
             #[cfg(feature = "parallel")]
             helpers: self.helpers.as_ref().filter(|_| threads > 1).map(Arc::clone),
+        }
+    }
+
+    /// Begins a frame: helpers come now, and stay from phase to phase until the returned guard is dropped.
+    pub fn frame(&self) -> Frame {
+        #[cfg(feature = "parallel")]
+        if let Some(helpers) = &self.helpers {
+            helpers.begin_frame(self.threads - 1);
+        }
+        Frame {
+            #[cfg(feature = "parallel")]
+            helpers: self.helpers.as_ref().map(Arc::clone),
         }
     }
 
@@ -317,7 +346,7 @@ mod tests {
         let done = AtomicUsize::new(0);
         let run = |tasks: usize| {
             wide.each_of(0..tasks, |_| _ = done.fetch_add(1, Relaxed));
-            (done.swap(0, Relaxed), helpers.invited())
+            (done.swap(0, Relaxed), helpers.coming())
         };
         assert_eq!([run(1), run(2), run(5), run(1000)], [(1, 0), (2, 1), (5, 4), (1000, 127)]);
     }
@@ -337,10 +366,10 @@ mod tests {
             };
             let mut pairs = Pairs::new();
             algorithm.find_pairs(&scene(1000), &mut pairs).unwrap();
-            assert_eq!(helpers.invited(), 0, "{name}: 1000 boxes");
+            assert_eq!(helpers.coming(), 0, "{name}: 1000 boxes");
             algorithm.find_pairs(&scene(3000), &mut pairs).unwrap();
             // Brute force takes as long for them as `grid-sap` for 9000.
-            assert_eq!(helpers.invited(), if name == "brute" { 7 } else { 1 }, "{name}: 3000 boxes");
+            assert_eq!(helpers.coming(), if name == "brute" { 7 } else { 1 }, "{name}: 3000 boxes");
         }
     }
 }

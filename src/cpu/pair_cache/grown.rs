@@ -11,7 +11,7 @@ use crate::filter::Filter;
 use std::ops::Range;
 
 /// Contains no box, not even an infinite one: a box that has no grown box yet counts as having left it.
-const NOTHING: Aabb = Aabb::new([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+pub(super) const NOTHING: Aabb = Aabb::new([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
 
 /// Every box grown by a margin, in the order of the input.
 #[derive(Debug)]

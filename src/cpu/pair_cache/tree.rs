@@ -3,6 +3,7 @@
 //! A box that moves widens the nodes above its leaf and never changes its leaf, so the tree gets worse until its boxes
 //! are sorted anew.
 
+use super::grown::NOTHING;
 use crate::aabb::Aabb;
 use crate::cpu::columns::{ensure, part};
 use crate::cpu::kernel::node::LANES;
@@ -14,6 +15,7 @@ use crate::error::Error;
 use crate::filter::Filter;
 use crate::load::SceneStats;
 use crate::pairs::Pairs;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// Fewest boxes that all threads move in a phase: fewer are moved in less time than a phase takes.
 const SMALLEST_SPLIT: usize = 1024;
@@ -23,16 +25,35 @@ const SMALLEST_SPLIT: usize = 1024;
 pub(super) struct GrownTree {
     tree: Tree,
     /// The place of each box in the tree.
-    place_of: Vec<u32>,
+    place_of: Vec<Place>,
     /// The moved boxes: place in the upper half, position in the input in the lower.
     keys: Vec<u64>,
     moved: usize,
     scratch: Vec<u64>,
+    /// The bounds of the moved boxes below each parent of leaves, if they changed its bounds; nothing after a refit.
+    widened: Vec<Aabb>,
+}
+
+/// A place that any thread may write.
+#[derive(Debug, Default)]
+struct Place(AtomicU32);
+
+impl Clone for Place {
+    fn clone(&self) -> Self {
+        Self(AtomicU32::new(self.0.load(Relaxed)))
+    }
 }
 
 impl GrownTree {
     pub(super) fn new(simd: Simd) -> Self {
-        Self { tree: Tree::new(simd), place_of: Vec::new(), keys: Vec::new(), moved: 0, scratch: Vec::new() }
+        Self {
+            tree: Tree::new(simd),
+            place_of: Vec::new(),
+            keys: Vec::new(),
+            moved: 0,
+            scratch: Vec::new(),
+            widened: Vec::new(),
+        }
     }
 
     pub(super) fn reserve(&mut self, objects: usize) -> Result<(), Error> {
@@ -49,7 +70,7 @@ impl GrownTree {
         filter: Option<&Filter>,
     ) -> Result<(), Error> {
         self.tree.build(workers, boxes, Members::From(0), stats, filter)?;
-        self.note_places(boxes.len())
+        self.note_places(workers, boxes.len())
     }
 
     /// Goes on to sort all boxes anew if that has begun or is `wanted`. Returns whether they stand in the new order now.
@@ -63,7 +84,7 @@ impl GrownTree {
         let goes_on = wanted || self.tree.is_being_renewed();
         let renewed = goes_on && self.tree.renew(workers, boxes, || SceneStats::of(boxes), filter)?;
         if renewed {
-            self.note_places(boxes.len())?;
+            self.note_places(workers, boxes.len())?;
         }
         Ok(renewed)
     }
@@ -74,11 +95,15 @@ impl GrownTree {
     }
 
     /// Notes the place of each box.
-    fn note_places(&mut self, boxes: usize) -> Result<(), Error> {
+    fn note_places(&mut self, workers: &Workers, boxes: usize) -> Result<(), Error> {
         ensure(&mut self.place_of, boxes, "boxes in a tree")?;
-        for (place, &id) in self.tree.ids().iter().enumerate().filter(|&(_, &id)| id != NOBODY) {
-            self.place_of[id as usize] = place as u32;
-        }
+        let (ids, place_of) = (self.tree.ids(), &self.place_of);
+        let size = ids.len().div_ceil(workers.tasks()).max(SMALLEST_SPLIT);
+        workers.each_of(ids.chunks(size).zip((0..).step_by(size)), |(ids, first)| {
+            for (place, &id) in (first..).zip(ids).filter(|&(_, &id)| id != NOBODY) {
+                place_of[id as usize].0.store(place as u32, Relaxed);
+            }
+        });
         Ok(())
     }
 
@@ -103,56 +128,75 @@ impl GrownTree {
         ensure(&mut self.place_of, boxes.len(), "boxes in a tree")?;
         ids.clone().take_while(|&id| (id as usize) < new).for_each(|id| self.remove(id));
         let place_of = &mut self.place_of;
-        self.tree.append(boxes, ids, |place, id| place_of[id as usize] = place as u32)
+        self.tree.append(boxes, ids, |place, id| *place_of[id as usize].0.get_mut() = place as u32)
     }
 
     /// Removes a box.
     pub(super) fn remove(&mut self, id: u32) {
-        self.tree.remove(self.place_of[id as usize] as usize);
+        self.tree.remove(*self.place_of[id as usize].0.get_mut() as usize);
     }
 
     /// Refits the tree to the moved boxes, which have the bounds `boxes[id]` now.
-    pub(super) fn refit(
+    pub(super) fn refit<'a>(
         &mut self,
         workers: &Workers,
         boxes: &[Aabb],
-        moved: impl Iterator<Item = u32> + Clone,
+        moved: impl Iterator<Item = &'a [u32]> + Clone + Send,
     ) -> Result<(), Error> {
-        self.moved = moved.clone().count();
+        self.moved = moved.clone().map(<[u32]>::len).sum();
         if self.moved == 0 {
             return Ok(());
         }
+        let workers = if self.moved < SMALLEST_SPLIT { &workers.fit(0) } else { workers };
         ensure(&mut self.keys, self.moved, "boxes that moved")?;
-        for (key, id) in self.keys.iter_mut().zip(moved) {
-            *key = u64::from(self.place_of[id as usize]) << 32 | u64::from(id);
-        }
         let keys = &mut self.keys[..self.moved];
-        // Sorts by place: the nodes of one box are then in the cache for the next.
-        sort(workers, keys, &mut self.scratch)?;
-        let keys = &*keys;
-        let Some((leaves, above)) = self.tree.levels_mut() else { return Ok(()) };
-        // Each task has its own leaves.
-        let size = leaves.len().div_ceil(if self.moved < SMALLEST_SPLIT { 1 } else { workers.tasks() }).max(1);
-        let mut rest = keys;
-        let parts = leaves.chunks_mut(size).zip((0..).step_by(size)).map(|(leaves, first)| {
-            let end = ((first + leaves.len()) * LANES) as u64;
-            let (part, behind) = rest.split_at(rest.partition_point(|key| key >> 32 < end));
+        let mut rest = &mut *keys;
+        let parts = moved.map(|moved| {
+            let (part, behind) = std::mem::take(&mut rest).split_at_mut(moved.len());
             rest = behind;
-            (leaves, first, part)
+            (part, moved)
         });
-        workers.each_of(parts, |(leaves, first, part)| {
-            for &key in part {
-                let place = (key >> 32) as usize;
-                leaves[place / LANES - first].set(place % LANES, &boxes[key as u32 as usize]);
+        let place_of = &self.place_of;
+        workers.each_of(parts, |(keys, moved)| {
+            for (key, &id) in keys.iter_mut().zip(moved) {
+                *key = u64::from(place_of[id as usize].0.load(Relaxed)) << 32 | u64::from(id);
             }
         });
-        for &key in keys {
-            let mut at = (key >> 32) as usize;
+        // Sorts by place: the nodes of one box are then in the cache for the next.
+        sort(workers, keys, &mut self.scratch)?;
+        let [leaves, parents, above @ ..] = self.tree.levels_mut() else { return Ok(()) };
+        let known = self.widened.len();
+        ensure(&mut self.widened, parents.len(), "boxes in a tree")?;
+        self.widened[known..].fill(NOTHING);
+        let widened = &mut self.widened[..parents.len()];
+        // Each task has its own parents, and the leaves below them.
+        let size = parents.len().div_ceil(workers.tasks()).max(1);
+        let mut rest = &*keys;
+        let parts = parents.chunks_mut(size).zip(leaves.chunks_mut(size * LANES)).zip(widened.chunks_mut(size));
+        let parts = parts.zip((0..).step_by(size * LANES * LANES)).map(|(((parents, leaves), widened), first)| {
+            let end = (first + leaves.len() * LANES) as u64;
+            let (part, behind) = rest.split_at(rest.partition_point(|key| key >> 32 < end));
+            rest = behind;
+            (parents, leaves, widened, first, part)
+        });
+        workers.each_of(parts, |(parents, leaves, widened, first, part)| {
+            for &key in part {
+                let (place, b) = ((key >> 32) as usize - first, &boxes[key as u32 as usize]);
+                let (leaf, parent) = (place / LANES, place / LANES / LANES);
+                leaves[leaf].set(place % LANES, b);
+                if parents[parent].widen(leaf % LANES, b) {
+                    widened[parent] = widened[parent].union(b);
+                }
+            }
+        });
+        for (parent, bounds) in widened.iter_mut().enumerate().filter(|(_, bounds)| **bounds != NOTHING) {
+            let bounds = std::mem::replace(bounds, NOTHING);
+            let mut at = parent;
             for level in above.iter_mut().take_while(|level| !level.is_empty()) {
-                at /= LANES;
-                if !level[at / LANES].widen(at % LANES, &boxes[key as u32 as usize]) {
+                if !level[at / LANES].widen(at % LANES, &bounds) {
                     break;
                 }
+                at /= LANES;
             }
         }
         Ok(())

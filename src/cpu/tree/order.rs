@@ -204,19 +204,24 @@ fn sort_dense_cell(keys: &mut [u64], boxes: &[Aabb]) {
     }
 }
 
-/// Calls `found` for every run of more than [`CROWDED`] keys with one code.
+/// Calls `found` for every run of more than [`CROWDED`] keys with one code. The keys ascend.
 fn each_dense_cell(keys: &[u64], mut found: impl FnMut(Range<usize>)) {
     let mut at = 0;
-    while at + CROWDED < keys.len() {
-        // Most runs are short: one look ahead shows that.
-        let same = code(keys[at]);
-        if code(keys[at + CROWDED]) == same {
-            let end = at + keys[at..].partition_point(|&key| code(key) == same);
-            found(at..end);
-            at = end;
-        } else {
-            at += 1;
+    // Each of these runs has a key at a multiple of `CROWDED`, and half as many keys before or behind that one.
+    while at < keys.len() {
+        let this = code(keys[at]);
+        let is_this = |k: usize| keys.get(k).is_some_and(|&key| code(key) == this);
+        let mut next = at + CROWDED;
+        if is_this(at + CROWDED / 2) || is_this(at.wrapping_sub(CROWDED / 2)) {
+            let first = at.saturating_sub(CROWDED);
+            let start = first + keys[first..at].partition_point(|&key| code(key) < this);
+            if is_this(start + CROWDED) {
+                let end = at + keys[at..].partition_point(|&key| code(key) == this);
+                found(start..end);
+                next = end.next_multiple_of(CROWDED);
+            }
         }
+        at = next;
     }
 }
 
@@ -276,6 +281,21 @@ mod tests {
             met.push(pairs.filter(|&(i, j)| leaves[i].overlaps(&leaves[j])).count() as f64 / leaves.len() as f64);
         }
         assert!(met.iter().all(|&m| m < 6.0 * met[0]), "{met:?}");
+    }
+
+    #[test]
+    fn dense_cells_are_the_long_runs() {
+        for k in 0..200 {
+            let mut keys: Vec<u64> = (0..500).map(|at| (mix(k) % (4 + k % 40) * at / 300) << 32 | at).collect();
+            keys.sort_unstable();
+            let runs = keys.chunk_by(|&a, &b| code(a) == code(b)).scan(0, |start, run| {
+                *start += run.len();
+                Some(*start - run.len()..*start)
+            });
+            let mut found = Vec::new();
+            each_dense_cell(&keys, |cell| found.push(cell));
+            assert_eq!(found, runs.filter(|run| run.len() > CROWDED).collect::<Vec<_>>());
+        }
     }
 
     #[test]
