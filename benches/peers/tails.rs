@@ -12,20 +12,17 @@ use std::time::{Duration, Instant};
 const FRAMES: usize = 600;
 const RUNS: [usize; 3] = [5, 3, 1];
 
-/// Fewer frames have no 99th percentile: less time takes runs away first, then frames.
-const FEW_FRAMES: usize = 100;
-
-/// Frames at least.
-const FEWEST_FRAMES: usize = 20;
+/// Fewer frames have no 99th percentile: less time takes runs away first, then frames, then all.
+const FEWEST_FRAMES: usize = 100;
 
 /// Who has a median over this many times the fastest takes no part.
 const RATIO: f64 = 8.0;
 
 /// Runs and frames for which the time is enough, when it is enough for `affordable` frames in all.
-fn plan(affordable: usize, warm_up: usize) -> (usize, usize) {
+fn plan(affordable: usize, warm_up: usize) -> Option<(usize, usize)> {
     let frames = |runs: usize| (affordable / runs).saturating_sub(warm_up);
-    let runs = RUNS.into_iter().find(|&runs| frames(runs) >= FEW_FRAMES).unwrap_or(1);
-    (runs, frames(runs).clamp(FEWEST_FRAMES, FRAMES))
+    let runs = RUNS.into_iter().find(|&runs| frames(runs) >= FEWEST_FRAMES)?;
+    Some((runs, frames(runs).min(FRAMES)))
 }
 
 /// Seconds of each frame of each run of one contestant.
@@ -59,7 +56,8 @@ pub(crate) fn measure(
     let mut lanes: Vec<&mut Lane> = point.lanes.iter_mut().filter(takes_part).collect();
     let frame: f64 = lanes.iter().map(|lane| lane.median()).sum();
     let affordable = (settings.tail_time.as_secs_f64() / frame) as usize;
-    let (runs, frames) = if settings.full { plan(affordable, warm_up as usize) } else { (2, 5) };
+    let plan = if settings.full { plan(affordable, warm_up as usize) } else { Some((2, 5)) };
+    let Some((runs, frames)) = plan else { return Ok(()) };
     let stream = |lane: &&mut Lane| Stream { name: lane.name.clone(), runs: Vec::new() };
     let mut streams: Vec<Stream> = lanes.iter().map(stream).collect();
     let started = Instant::now();
