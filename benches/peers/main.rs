@@ -79,14 +79,20 @@ fn chosen(mut all: Vec<Contestant>, names: &[String]) -> Result<Vec<Contestant>,
     Ok(all)
 }
 
-/// All scenarios on one thread, or `uniform` on several.
-fn compare(threads: u32, settings: &Settings) -> Result<Vec<Point>, String> {
+/// Measures all scenarios on one thread, or `uniform` on several, behind what was compared before. Calls `keep` after
+/// each scenario.
+fn compare(
+    threads: u32,
+    settings: &Settings,
+    compared: &mut Vec<(u32, Vec<Point>)>,
+    keep: impl Fn(&[(u32, Vec<Point>)]) -> Result<(), String>,
+) -> Result<(), String> {
     println!("\nthreads: {threads}");
     let mut registry = Registry::with_cores(threads);
     registry.pin_threads();
     let tuning = machine::tuning(&registry, threads, settings)?;
     let pool = if threads > 1 { Some(machine::pinned_pool(threads as usize)?) } else { None };
-    let mut points = Vec::new();
+    compared.push((threads, Vec::new()));
     let everyone = |scenario| {
         let mut all = ours(&registry, &tuning).map_err(|e| e.to_string())?;
         all.extend(peers(pool.as_ref(), scenario));
@@ -102,29 +108,34 @@ fn compare(threads: u32, settings: &Settings) -> Result<Vec<Point>, String> {
             };
             let point = measured(&make, scenario, objects, settings)?;
             gone.extend(point.left.iter().cloned());
-            points.push(point);
+            if let Some((_, points)) = compared.last_mut() {
+                points.push(point);
+            }
         }
+        keep(compared)?;
     }
-    Ok(points)
+    Ok(())
 }
 
 fn bench() -> Result<(), String> {
     let settings = Settings::from_environment()?;
+    let keep = |compared: &[(u32, Vec<Point>)]| {
+        let Some(folder) = &settings.results else { return Ok(()) };
+        let put = |name: &str, text: String| {
+            let path = folder.join(name);
+            std::fs::write(&path, text).map_err(|e| format!("{}: {e}", path.display()))
+        };
+        put("peers.csv", table::csv(compared))?;
+        put("peers.md", table::summary(compared))
+    };
     let mut compared = Vec::new();
     for &threads in &settings.threads {
-        compared.push((threads, compare(threads, &settings)?));
+        compare(threads, &settings, &mut compared, keep)?;
     }
-    let summary = table::summary(&compared);
-    let Some(folder) = &settings.results else {
-        println!("\n{summary}");
-        return Ok(());
-    };
-    let put = |name: &str, text: String| {
-        let path = folder.join(name);
-        std::fs::write(&path, text).map_err(|e| format!("{}: {e}", path.display()))
-    };
-    put("peers.csv", table::csv(&compared))?;
-    put("peers.md", summary)
+    if settings.results.is_none() {
+        println!("\n{}", table::summary(&compared));
+    }
+    Ok(())
 }
 
 fn main() -> ExitCode {
