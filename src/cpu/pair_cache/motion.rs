@@ -45,11 +45,13 @@ const MARGIN_STEP: f32 = 1.005;
 /// Of the boxes so many leave at once where the scene jumped, or where this method has not seen its last frames.
 const JUMP: f32 = 0.5;
 
-/// Places over boxes beyond which the tree has too many empty lanes.
-const MOST_PLACES: f32 = 4.0 / 3.0;
+/// Places over boxes beyond which the tree has too many empty lanes, and is sorted anew over some frames or at once.
+const MOST_PLACES: [f32; 2] = [4.0 / 3.0, 8.0 / 3.0];
 
-/// Boxes that leave, as a share of all, from which it is learned how many nodes a good tree looks at.
+/// Boxes that leave a sorted tree, as a share of all and at least, from which it is learned how many nodes a query
+/// looks at.
 const FRESH: f32 = 0.02;
+const FEWEST_FRESH: f32 = 64.0;
 
 /// Frames over which grown boxes that are too wide are made smaller.
 const SHRINKING: usize = 64;
@@ -258,14 +260,14 @@ impl Motion {
     pub(super) fn wants_rebuild(&self, objects: usize, changes: &Changes, places: usize) -> bool {
         let Some(keeping) = self.keeping else { return false };
         changes.left as f32 > JUMP * objects as f32
-            || places as f32 > 2.0 * MOST_PLACES * objects as f32 + 64.0
+            || places as f32 > MOST_PLACES[1] * objects as f32 + 64.0
             || keeping.excess > cost::rebuild(cost::far(objects), keeping.kept)
     }
 
-    /// Whether the boxes in the tree are to be sorted anew, over some frames.
-    /// `places`: of the tree, those of boxes that went elsewhere included.
+    /// Whether the boxes in the tree are to be sorted anew, over some frames. `places`: of the tree, those that boxes
+    /// have left included.
     pub(super) fn wants_renewal(&self, objects: usize, places: usize) -> bool {
-        places as f32 > MOST_PLACES * objects as f32 + 64.0
+        places as f32 > MOST_PLACES[0] * objects as f32 + 64.0
             || self.keeping.is_some_and(|k| k.excess > cost::renewal(cost::far(objects)))
     }
 
@@ -328,7 +330,7 @@ impl Motion {
             (k.grown, k.missed, k.wide_from) = (k.margin.share, 0.0, None);
             (k.fresh, k.excess) = ([0.0; 2], 0.0);
         } else {
-            if share(k.fresh[1] as usize) < FRESH || k.fresh[1] < 64.0 {
+            if share(k.fresh[1] as usize) < FRESH || k.fresh[1] < FEWEST_FRESH {
                 k.fresh = [k.fresh[0] + did.nodes as f32, k.fresh[1] + changes.left as f32];
             } else {
                 let more = cost::left(far, nodes) - cost::left(far, k.fresh[0] / k.fresh[1]);
