@@ -60,6 +60,7 @@ impl BroadPhase for Bvh {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cpu::brute::double_loop;
     use crate::scene::{Scenario, Scene};
     use crate::splitmix::mix;
     use crate::{Filter, Membership};
@@ -99,13 +100,7 @@ mod tests {
                 .then(|| Filter::new(fixed.iter().map(|&fixed| Membership { fixed, ..Membership::ALL }).collect()));
             let mut invalid = boxes.clone();
             invalid[2].min[2] = f32::NAN;
-            pairs.set_filter(None);
-            let mut expected = Pairs::new();
-            (0..boxes.len() as u32).for_each(|j| {
-                let wanted = |i: &u32| filter.as_ref().is_none_or(|f| f.wants((*i, j)));
-                let meets = |i: &u32| boxes[*i as usize].overlaps(&boxes[j as usize]);
-                (0..j).filter(meets).filter(wanted).for_each(|i| expected.push(i, j));
-            });
+            let expected = double_loop(&boxes, |pair| filter.as_ref().is_none_or(|f| f.wants(pair)));
             pairs.set_filter(filter);
             for method in &mut methods {
                 if frame % 9 == 5 {

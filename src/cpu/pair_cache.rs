@@ -4,8 +4,8 @@
 //! While every box stays within its grown box, every overlapping pair is among the pairs of grown boxes. So a frame
 //! costs one test of each box and one of each kept pair. A box that leaves its grown box gets a new one, and a tree of
 //! the grown boxes finds its new neighbours. When that has become expensive, the tree is sorted anew, over some frames.
-//! If, by the clock, all this takes longer than to find all pairs with a tree of the boxes themselves, such a tree finds
-//! them until the boxes slow down.
+//! If, by the clock, all this takes longer than to find all pairs with a tree of the boxes themselves, such a tree
+//! finds them until the boxes slow down.
 //!
 //! Verlet (Phys. Rev. 159, 1967) kept such lists of neighbours for molecules.
 
@@ -31,7 +31,7 @@ use motion::{Advice, Motion, Work};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use tree::GrownTree;
 
-/// Boxes for each list of kept pairs: what a frame reads of so many fits into the second-level cache.
+/// Boxes for each list of kept pairs. With a cache line each they take 256 KB, which most second-level caches hold.
 const BOXES_PER_LIST: usize = 4096;
 
 /// The method; see the module.
@@ -182,8 +182,8 @@ fn most_of_list(most_kept: usize, tasks: usize) -> usize {
 
 impl PairCache {
     /// Takes as many threads of this width as a frame of `boxes` boxes keeps busy, with as many lists. They stay until
-    /// that number changes by a factor of two, because dealing the kept pairs out to other lists takes time. Then what a
-    /// box costs is unknown, and nothing is kept.
+    /// that number changes by a factor of two, because dealing the kept pairs out to other lists takes time. Then the
+    /// cost of a box is unknown, and nothing is kept.
     fn fit(&mut self, boxes: usize) {
         if self.fitted_for.is_some_and(|before| boxes <= 2 * before.max(1) && before <= 2 * boxes.max(1)) {
             return;
@@ -239,7 +239,8 @@ impl PairCache {
         let parts = kept.len();
         let again = motion.next_to_shrink(boxes.len());
         let changes = grown.check(workers, boxes, margin, again, pairs.filter(), shares)?;
-        let rebuilt = motion.wants_rebuild(boxes.len(), &changes, tree.places());
+        // A renewal takes some frames. If the tree has eight places for three boxes before it ends, all is made again.
+        let rebuilt = motion.wants_rebuild(boxes.len(), &changes) || tree.is_sparse(2 * boxes.len());
         *last_frame = if rebuilt { FrameKind::Rebuilt } else { FrameKind::Updated };
         if rebuilt {
             grown.grow_all(workers, boxes, motion.renew(plan, boxes, &changes), shares);
@@ -258,7 +259,7 @@ impl PairCache {
             changes.gone.clone().for_each(|id| tree.remove(id as u32));
             let far = shares.iter().flat_map(|s| s.far.iter().copied());
             tree.insert(grown.as_slice(), far, changes.new.start)?;
-            let wanted = motion.wants_renewal(boxes.len(), tree.places());
+            let wanted = motion.wants_renewal(boxes.len()) || tree.is_sparse(boxes.len());
             if tree.renew(workers, grown.as_slice(), pairs.filter(), wanted)? {
                 motion.renewed();
             }
@@ -336,6 +337,7 @@ impl Sift<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cpu::brute::double_loop;
     use crate::scene::{Scenario, Scene};
     use FrameKind::{FromScratch, Rebuilt, Updated};
 
@@ -446,11 +448,7 @@ mod tests {
                 }
                 method.set_threads(threads[frame / 40 % threads.len()]);
                 method.find_pairs(&boxes, &mut pairs).unwrap();
-                let mut expected = Pairs::new();
-                (0..boxes.len() as u32).for_each(|j| {
-                    let meets = |i: &u32| boxes[*i as usize].overlaps(&boxes[j as usize]);
-                    (0..j).filter(meets).for_each(|i| expected.push(i, j));
-                });
+                let expected = double_loop(&boxes, |_| true);
                 assert_eq!(pairs.fingerprint(), expected.fingerprint(), "{simd:?}, frame {frame}");
                 kept += u32::from(method.last_frame().kind == Updated);
                 renewals += u32::from(method.last_frame().kind == Updated && method.tree.places() < places);

@@ -43,6 +43,9 @@ const AHEAD: usize = 16;
 /// Fewest nodes above the leaves that a task fills, with their 256 boxes each.
 const SMALLEST_FILL: usize = 4;
 
+/// Places over boxes beyond which a tree has too many empty lanes.
+const MOST_PLACES: f64 = 4.0 / 3.0;
+
 /// Steps of a renewal in which codes are made, each for one part of the boxes.
 const RENEWAL_PARTS: usize = 4;
 
@@ -77,12 +80,6 @@ struct Renewal {
     step: usize,
     /// Boxes that may move, once all are sorted.
     moving: usize,
-}
-
-impl Renewal {
-    fn of(curve: Curve, boxes: usize) -> Self {
-        Self { curve, boxes, step: 0, moving: 0 }
-    }
 }
 
 /// The boxes of a frame that are in a tree.
@@ -154,8 +151,8 @@ impl Tree {
         filter: Option<&Filter>,
     ) -> Result<bool, Error> {
         let (len, all) = (boxes.len(), Members::From(0));
-        let renewal = self.renewal.take().filter(|renewal| renewal.boxes == len);
-        let mut renewal = renewal.unwrap_or_else(|| Renewal::of(Curve::over(&stats(), len), len));
+        let begin = || Renewal { curve: Curve::over(&stats(), len), boxes: len, step: 0, moving: 0 };
+        let mut renewal = self.renewal.take().filter(|renewal| renewal.boxes == len).unwrap_or_else(begin);
         match renewal.step {
             step @ 0..RENEWAL_PARTS => {
                 if step == 0 {
@@ -311,8 +308,14 @@ impl Tree {
     }
 
     /// Returns the number of places in use, those of removed boxes included.
+    #[cfg(test)]
     pub(crate) fn places(&self) -> usize {
         self.places
+    }
+
+    /// Returns whether too many lanes are empty for this many boxes.
+    pub(crate) fn is_sparse(&self, boxes: usize) -> bool {
+        is_sparse(self.places, boxes)
     }
 
     /// Adds part `k` of `parts` of the pairs of its boxes with each other, without those of two fixed boxes.
@@ -387,6 +390,10 @@ impl Tree {
     }
 }
 
+fn is_sparse(places: usize, boxes: usize) -> bool {
+    places as f64 > MOST_PLACES * boxes as f64 + 64.0
+}
+
 /// Makes room for this many places and for the nodes above them, with unspecified content. Returns the number of
 /// levels.
 fn lay_out(levels: &mut Vec<Vec<Node>>, ids: &mut Vec<u32>, places: usize) -> Result<usize, Error> {
@@ -419,4 +426,14 @@ fn grow<T: Copy>(list: &mut Vec<T>, len: usize, empty: T) -> Result<(), Error> {
         list.resize(len, empty);
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn third_of_the_places_may_be_empty() {
+        assert!(!is_sparse(1200, 1000) && is_sparse(1500, 1000));
+    }
 }

@@ -45,9 +45,6 @@ const MARGIN_STEP: f32 = 1.005;
 /// Of the boxes so many leave at once where the scene jumped, or where this method has not seen its last frames.
 const JUMP: f32 = 0.5;
 
-/// Places over boxes beyond which the tree has too many empty lanes, and is sorted anew over some frames or at once.
-const MOST_PLACES: [f32; 2] = [4.0 / 3.0, 8.0 / 3.0];
-
 /// Boxes that leave a sorted tree, as a share of all and at least, from which it is learned how many nodes a query
 /// looks at.
 const FRESH: f32 = 0.02;
@@ -255,20 +252,15 @@ impl Motion {
         self.keeping.map_or(1.0, |k| k.work.last / k.work.mean())
     }
 
-    /// Whether tree and pairs are made again in this frame, in which boxes left as `changes` says. `places`: of the
-    /// tree, those of removed boxes included.
-    pub(super) fn wants_rebuild(&self, objects: usize, changes: &Changes, places: usize) -> bool {
+    /// Whether tree and pairs are made again in this frame, in which boxes left as `changes` says.
+    pub(super) fn wants_rebuild(&self, objects: usize, changes: &Changes) -> bool {
         let Some(keeping) = self.keeping else { return false };
-        changes.left as f32 > JUMP * objects as f32
-            || places as f32 > MOST_PLACES[1] * objects as f32 + 64.0
-            || keeping.excess > cost::rebuild(cost::far(objects), keeping.kept)
+        changes.left as f32 > JUMP * objects as f32 || keeping.excess > cost::rebuild(cost::far(objects), keeping.kept)
     }
 
-    /// Whether the boxes in the tree are to be sorted anew, over some frames. `places`: of the tree, those that boxes
-    /// have left included.
-    pub(super) fn wants_renewal(&self, objects: usize, places: usize) -> bool {
-        places as f32 > MOST_PLACES[0] * objects as f32 + 64.0
-            || self.keeping.is_some_and(|k| k.excess > cost::renewal(cost::far(objects)))
+    /// Whether the boxes in the tree are to be sorted anew, over some frames.
+    pub(super) fn wants_renewal(&self, objects: usize) -> bool {
+        self.keeping.is_some_and(|k| k.excess > cost::renewal(cost::far(objects)))
     }
 
     /// The boxes in the tree stand in a new order.

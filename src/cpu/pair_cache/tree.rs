@@ -73,7 +73,7 @@ impl GrownTree {
         self.note_places(workers, boxes.len())
     }
 
-    /// Goes on to sort all boxes anew if that has begun or is `wanted`. Returns whether they stand in the new order now.
+    /// Goes on to sort all boxes anew if that has begun or is `wanted`. Returns whether they stand in the new order.
     pub(super) fn renew(
         &mut self,
         workers: &Workers,
@@ -90,8 +90,14 @@ impl GrownTree {
     }
 
     /// Returns the number of places in use, those of removed boxes included.
+    #[cfg(test)]
     pub(super) fn places(&self) -> usize {
         self.tree.places()
+    }
+
+    /// Returns whether too many lanes are empty for this many boxes.
+    pub(super) fn is_sparse(&self, boxes: usize) -> bool {
+        self.tree.is_sparse(boxes)
     }
 
     /// Notes the place of each box.

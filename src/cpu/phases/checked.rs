@@ -5,8 +5,8 @@ use super::*;
 use shuttle::sync::{Barrier, atomic::AtomicBool};
 use shuttle::{check_random, thread};
 
-/// Rounds in which helpers linger: none, about as long as a phase, and until the frame ends. With the last, helpers that
-/// miss the end never return.
+/// Rounds in which helpers linger: none, about as long as a phase, and until the frame ends. With the last, helpers
+/// that miss the end never return.
 const ROUNDS: [u32; 3] = [0, 20, u32::MAX];
 
 const HELPERS: usize = 2;

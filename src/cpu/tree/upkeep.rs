@@ -18,9 +18,6 @@ use crate::load::SceneStats;
 /// Frames in which no refit is tried after one that was in vain, at most.
 const MOST_PAUSE: u32 = 64;
 
-/// Places over boxes beyond which a tree has too many empty lanes.
-const MOST_PLACES: f64 = 4.0 / 3.0;
-
 /// What a build costs over a refit, in searches, without a clock. In `uniform` and `clustered` with 1000 to 100 000
 /// boxes on the Zen 3 host of `datasets/` it was 0.8 to 1.8.
 const NO_CLOCK: f64 = 1.0;
@@ -151,8 +148,7 @@ impl Upkeep {
         let area = tree.half_area(known.longest) / boxes.len() as f64;
         // NaN, of 0 over 0, counts as 0.
         known.excess = (area / known.area - 1.0).max(0.0);
-        let in_vain =
-            known.sum + known.excess > price || tree.places() as f64 > MOST_PLACES * boxes.len() as f64 + 64.0;
+        let in_vain = known.sum + known.excess > price || tree.is_sparse(boxes.len());
         if in_vain {
             self.pause = self.next_pause;
             self.next_pause = (2 * self.next_pause + 1).min(MOST_PAUSE);
