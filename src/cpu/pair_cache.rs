@@ -138,7 +138,7 @@ impl BroadPhase for PairCache {
             let searching = Instant::now();
             outputs.find(workers, pairs, |k, parts, list| tree.self_pairs(k, parts, list));
             upkeep.searched(searching, boxes.len());
-            self.motion.found_from_scratch(boxes.len(), pairs.overlapping(), each(started), upkeep.built_ns());
+            self.motion.found_from_scratch(boxes.len(), pairs.overlapping(), each(started));
             self.last_frame = FrameKind::FromScratch;
         } else {
             self.motion.found(boxes.len(), pairs.overlapping());

@@ -195,11 +195,10 @@ impl Motion {
         self.density = Some(pairs as f32 / objects.max(1) as f32);
     }
 
-    /// Learns from a frame from scratch with this many pairs, which took `took` nanoseconds for each box. One that
-    /// builds its tree takes `built`.
-    pub(super) fn found_from_scratch(&mut self, objects: usize, pairs: u64, took: f32, built: Option<f32>) {
+    /// Learns from a frame from scratch with this many pairs, which took `took` nanoseconds for each box.
+    pub(super) fn found_from_scratch(&mut self, objects: usize, pairs: u64, took: f32) {
         self.found(objects, pairs);
-        self.prices.add_scratch(took, built, cost::scratch(cost::far(objects), self.density.unwrap_or_default()));
+        self.prices.add_scratch(took, cost::scratch(cost::far(objects), self.density.unwrap_or_default()));
     }
 
     /// Keeping failed, because there were too many pairs to keep or because it did not pay; it will not be tried for

@@ -5,9 +5,6 @@ use crate::cpu::mean_time::MeanTime;
 /// Frames from scratch before pairs are kept: one that builds the tree, and two that may refit it.
 const FEWEST_FRAMES: u32 = 3;
 
-/// Keeping is tried if it promises to cost at most this many times a frame from scratch: the promise is rough.
-const HOPE: f32 = 1.3;
-
 /// Keeping stops when it has cost this many frames from scratch more than finding as many from scratch. To begin costs
 /// one or two.
 const MOST_LOST: f32 = 6.0;
@@ -23,16 +20,15 @@ pub(super) struct Prices {
     timed: bool,
     /// Number of frames from scratch.
     frames: u32,
-    /// Of the mean frame from scratch, and of one that builds its tree.
+    /// Of the mean frame from scratch.
     scratch: MeanTime,
-    built: f32,
     /// Cost of keeping beyond that of frames from scratch, in such frames, since it was last below.
     lost: f32,
 }
 
 impl Prices {
     pub(super) fn new(timed: bool) -> Self {
-        Self { timed, frames: 0, scratch: MeanTime::default(), built: 1.0, lost: 0.0 }
+        Self { timed, frames: 0, scratch: MeanTime::default(), lost: 0.0 }
     }
 
     /// Forgets all that was learned.
@@ -40,23 +36,18 @@ impl Prices {
         *self = Self::new(self.timed);
     }
 
-    /// Learns from a frame from scratch, of which the model says `model`. `built`: the time of one that builds.
-    pub(super) fn add_scratch(&mut self, took: f32, built: Option<f32>, model: f32) {
+    /// Learns from a frame from scratch, of which the model says `model`.
+    pub(super) fn add_scratch(&mut self, took: f32, model: f32) {
         self.frames = self.frames.saturating_add(1);
-        let now = took / model;
         if self.frames < FEWEST_FRAMES {
             self.scratch = MeanTime::default();
         }
-        self.scratch.add(f64::from(now));
-        self.built = built.map_or(now, |built| built / model);
+        self.scratch.add(f64::from(took / model));
     }
 
-    /// Returns whether keeping is worth a try.
+    /// Returns whether keeping is worth a try. The clock ends a try that does not pay.
     pub(super) fn promises(&self, keeping: f32, scratch: f32) -> bool {
-        if !self.timed {
-            return keeping < scratch;
-        }
-        self.frames >= FEWEST_FRAMES && keeping * self.built < HOPE * scratch * self.of_scratch()
+        keeping < scratch && (!self.timed || self.frames >= FEWEST_FRAMES)
     }
 
     fn of_scratch(&self) -> f32 {
@@ -89,10 +80,9 @@ mod tests {
         let mut prices = Prices::new(true);
         for _ in 0..3 {
             assert!(!prices.promises(10.0, 40.0));
-            prices.add_scratch(50.0, Some(100.0), 40.0);
+            prices.add_scratch(50.0, 40.0);
         }
-        // A unit of the model is 2.5 ns for a build, so keeping promises 25 ns; then 75 ns.
-        assert!(prices.promises(10.0, 40.0) && !prices.promises(30.0, 40.0));
+        assert!(prices.promises(39.0, 40.0) && !prices.promises(41.0, 40.0));
         prices.begin();
         // The first frame builds. Then half a frame is saved in each.
         assert!(prices.pays(150.0, 10.0, 40.0));

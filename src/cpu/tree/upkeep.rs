@@ -73,11 +73,6 @@ impl Upkeep {
         }
     }
 
-    /// Returns the nanoseconds for each box of a frame that builds its tree.
-    pub(crate) fn built_ns(&self) -> Option<f32> {
-        self.build.get().zip(self.search.get()).map(|(build, search)| (build + search) as f32)
-    }
-
     /// Returns the number of trees that were built.
     #[cfg(test)]
     pub(crate) fn builds(&self) -> u64 {
