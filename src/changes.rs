@@ -184,7 +184,12 @@ fn fill<Id: Copy>(pairs: &mut Vec<(Id, Id)>, keys: &[u64], id: impl Fn(u32) -> I
 }
 
 /// Adds the elements that only `now` has to `begun`, and those that only `before` has to `ended`. Both lists ascend.
-fn differences<T: Copy + Ord>(now: &[T], before: &[T], begun: &mut Vec<T>, ended: &mut Vec<T>) -> Result<(), Error> {
+pub(crate) fn differences<T: Copy + Ord>(
+    now: &[T],
+    before: &[T],
+    begun: &mut Vec<T>,
+    ended: &mut Vec<T>,
+) -> Result<(), Error> {
     let (mut now, mut before) = (now.iter().peekable(), before.iter().peekable());
     loop {
         match (now.peek(), before.peek()) {

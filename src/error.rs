@@ -3,6 +3,7 @@
 mod gpu;
 
 use crate::algorithm::AlgorithmId;
+use crate::space::Handle;
 use std::fmt;
 
 pub use crate::algorithm::ParseIdError;
@@ -38,6 +39,18 @@ pub enum Error {
         position: u32,
         /// Number of ids.
         ids: usize,
+    },
+    /// A handle of a body that was removed, or of another [`Space`](crate::Space).
+    StaleHandle {
+        /// The handle that was given.
+        handle: Handle,
+    },
+    /// A box that can't be ordered, for a body of a [`Space`](crate::Space).
+    InvalidBody {
+        /// The body.
+        handle: Handle,
+        /// What is wrong with its box.
+        defect: BoxDefect,
     },
     /// An allocation was refused.
     OutOfMemory {
@@ -192,6 +205,12 @@ impl fmt::Display for Error {
             }
             Error::MissingId { position, ids } => {
                 write!(f, "box {position} is in a pair, but there are {ids} ids; give one for each box")
+            }
+            Error::StaleHandle { handle } => {
+                write!(f, "handle {handle} names no body of this space; it was removed, or is of another space")
+            }
+            Error::InvalidBody { handle, defect } => {
+                write!(f, "the box for body {handle} {defect}; the body keeps its previous box")
             }
             Error::OutOfMemory { what, elements } => {
                 write!(f, "no memory for {elements} {what}; set a limit on the pairs or use fewer boxes")

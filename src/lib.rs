@@ -50,6 +50,7 @@ mod pairs;
 mod registry;
 #[cfg(test)]
 mod scene;
+mod space;
 #[doc(hidden)]
 pub mod splitmix;
 #[doc(hidden)]
@@ -70,4 +71,5 @@ pub use pairs::{PairOrder, Pairs};
 #[cfg(feature = "parallel")]
 pub use rayon as rayon1;
 pub use registry::Registry;
+pub use space::{Body, Handle, Space};
 pub use tuning::Tuning;

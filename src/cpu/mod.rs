@@ -24,7 +24,9 @@ mod workers;
 pub use helpers::pinned_pool;
 pub(crate) use level::Simd;
 pub use level::{SimdLevel, SimdLevelError};
+pub(crate) use pair_cache::GrownTree;
 pub use threads::Threads;
+pub(crate) use tree::Members;
 pub use workers::Workers;
 
 use crate::broad_phase::BroadPhase;

@@ -21,7 +21,7 @@ use crate::cpu::Threads;
 use crate::cpu::columns::part;
 use crate::cpu::kernel::{overlap, prefetch};
 use crate::cpu::level::Simd;
-use crate::cpu::tree::{FAR, Upkeep};
+use crate::cpu::tree::{FAR, Members, Upkeep};
 use crate::cpu::workers::{Outputs, Workers};
 use crate::error::Error;
 use crate::load::{FramePlan, SceneStats};
@@ -29,7 +29,7 @@ use crate::pairs::Pairs;
 use grown::{Grown, Margin, Share};
 use motion::{Advice, Motion, Work};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
-use tree::GrownTree;
+pub(crate) use tree::GrownTree;
 
 /// Boxes for each list of kept pairs. With a cache line each they take 256 KB, which most second-level caches hold.
 const BOXES_PER_LIST: usize = 4096;
@@ -245,7 +245,7 @@ impl PairCache {
         if rebuilt {
             grown.grow_all(workers, boxes, motion.renew(plan, boxes, &changes), shares);
             let stats = SceneStats::of(grown.as_slice());
-            tree.build(workers, grown.as_slice(), &stats, pairs.filter())?;
+            tree.build(workers, grown.as_slice(), Members::From(0), &stats, pairs.filter())?;
             let most = most_of_list(motion.most_kept(boxes.len()), workers.tasks());
             for list in kept.iter_mut() {
                 list.clear();

@@ -76,6 +76,16 @@ impl Workers {
         })
     }
 
+    /// Returns the calling thread alone.
+    pub(crate) fn one() -> Self {
+        Self {
+            threads: 1,
+            tasks: 1,
+            #[cfg(feature = "parallel")]
+            helpers: None,
+        }
+    }
+
     /// Returns the number of threads, the calling one included.
     pub fn threads(&self) -> usize {
         self.threads

@@ -22,7 +22,7 @@ const SMALLEST_SPLIT: usize = 1024;
 
 /// See the module.
 #[derive(Debug)]
-pub(super) struct GrownTree {
+pub(crate) struct GrownTree {
     tree: Tree,
     /// The place of each box in the tree.
     place_of: Vec<Place>,
@@ -45,7 +45,7 @@ impl Clone for Place {
 }
 
 impl GrownTree {
-    pub(super) fn new(simd: Simd) -> Self {
+    pub(crate) fn new(simd: Simd) -> Self {
         Self {
             tree: Tree::new(simd),
             place_of: Vec::new(),
@@ -56,25 +56,26 @@ impl GrownTree {
         }
     }
 
-    pub(super) fn reserve(&mut self, objects: usize) -> Result<(), Error> {
+    pub(crate) fn reserve(&mut self, objects: usize) -> Result<(), Error> {
         self.tree.reserve(objects)?;
         ensure(&mut self.place_of, objects, "boxes in a tree")
     }
 
-    /// Builds the tree of these boxes, of which `stats` are the statistics.
-    pub(super) fn build(
+    /// Builds the tree of the members of `boxes`, of which `stats` are the statistics.
+    pub(crate) fn build(
         &mut self,
         workers: &Workers,
         boxes: &[Aabb],
+        members: Members<'_>,
         stats: &SceneStats,
         filter: Option<&Filter>,
     ) -> Result<(), Error> {
-        self.tree.build(workers, boxes, Members::From(0), stats, filter)?;
+        self.tree.build(workers, boxes, members, stats, filter)?;
         self.note_places(workers, boxes.len())
     }
 
     /// Goes on to sort all boxes anew if that has begun or is `wanted`. Returns whether they stand in the new order.
-    pub(super) fn renew(
+    pub(crate) fn renew(
         &mut self,
         workers: &Workers,
         boxes: &[Aabb],
@@ -91,12 +92,12 @@ impl GrownTree {
 
     /// Returns the number of places in use, those of removed boxes included.
     #[cfg(test)]
-    pub(super) fn places(&self) -> usize {
+    pub(crate) fn places(&self) -> usize {
         self.tree.places()
     }
 
     /// Returns whether too many lanes are empty for this many boxes.
-    pub(super) fn is_sparse(&self, boxes: usize) -> bool {
+    pub(crate) fn is_sparse(&self, boxes: usize) -> bool {
         self.tree.is_sparse(boxes)
     }
 
@@ -114,18 +115,18 @@ impl GrownTree {
     }
 
     /// Returns the tree for the boxes themselves, whose places are not known then.
-    pub(super) fn of_boxes(&mut self) -> &mut Tree {
+    pub(crate) fn of_boxes(&mut self) -> &mut Tree {
         &mut self.tree
     }
 
     /// Adds part `k` of `parts` of the pairs of all boxes that were in the tree when it was built.
-    pub(super) fn self_pairs(&self, k: usize, parts: usize, pairs: &mut Pairs) {
+    pub(crate) fn self_pairs(&self, k: usize, parts: usize, pairs: &mut Pairs) {
         self.tree.self_pairs(k, parts, pairs);
     }
 
     /// Moves boxes to new leaves, which have no bounds until [`refit`](Self::refit) sets them. Boxes from `new` on are
     /// not in the tree yet.
-    pub(super) fn insert(
+    pub(crate) fn insert(
         &mut self,
         boxes: &[Aabb],
         ids: impl Iterator<Item = u32> + Clone,
@@ -138,12 +139,12 @@ impl GrownTree {
     }
 
     /// Removes a box.
-    pub(super) fn remove(&mut self, id: u32) {
+    pub(crate) fn remove(&mut self, id: u32) {
         self.tree.remove(*self.place_of[id as usize].0.get_mut() as usize);
     }
 
     /// Refits the tree to the moved boxes, which have the bounds `boxes[id]` now.
-    pub(super) fn refit<'a>(
+    pub(crate) fn refit<'a>(
         &mut self,
         workers: &Workers,
         boxes: &[Aabb],
@@ -209,7 +210,7 @@ impl GrownTree {
     }
 
     /// Returns the moved boxes in part `k` of `parts` of the tree, in its order.
-    pub(super) fn moved(&self, k: usize, parts: usize) -> impl Iterator<Item = u32> {
+    pub(crate) fn moved(&self, k: usize, parts: usize) -> impl Iterator<Item = u32> {
         let keys = &self.keys[..self.moved];
         let places = part(self.tree.ids().len(), k, parts);
         let [first, end] = [places.start, places.end].map(|at| keys.partition_point(|key| key >> 32 < at as u64));
@@ -218,7 +219,7 @@ impl GrownTree {
 
     /// Calls `found` for every box that overlaps these bounds. Returns the number of visited nodes.
     #[inline]
-    pub(super) fn overlapping(&self, bounds: &Aabb, found: impl FnMut(u32)) -> u32 {
+    pub(crate) fn overlapping(&self, bounds: &Aabb, found: impl FnMut(u32)) -> u32 {
         self.tree.overlapping(bounds, found)
     }
 }

@@ -1,0 +1,305 @@
+//! Bodies with handles: those that move, those that rest, and the pairs of both.
+//!
+//! Bodies that were set lately are *active*: an [`Adaptive`] finds their pairs in every update. If there are many more
+//! bodies that were not set for some updates, these *rest*: they stand in a tree, and the pairs among them stay until
+//! one of the two wakes. Each active body keeps its resting neighbours while it stays within its fat AABB. So bodies
+//! that are not set cost nothing.
+
+mod active;
+mod body;
+mod handle;
+mod links;
+mod near;
+mod resting;
+mod slots;
+#[cfg(test)]
+mod tests;
+mod update;
+
+use crate::aabb::Aabb;
+use crate::adaptive::Adaptive;
+use crate::error::Error;
+use crate::pairs::Sorter;
+use crate::registry::Registry;
+use crate::tuning::Tuning;
+use active::Active;
+use links::Links;
+use near::Neighbours;
+use resting::Resting;
+use slots::Slots;
+
+pub use body::Body;
+pub use handle::Handle;
+
+/// Updates without being set after which a body may rest. Waking it costs about as much as that many updates of an
+/// active one.
+const IDLE: u64 = 8;
+
+/// Bodies begin to rest when those that could are more than this many times the others, and all wake when the resting
+/// ones are fewer than half of that. Together in one search, a body that does not move costs little.
+const MANY: usize = 8;
+
+/// Fewest bodies that rest.
+const FEWEST: usize = 64;
+
+/// Bodies with handles, and the pairs of those that overlap.
+///
+/// ```
+/// use sapwise::{Aabb, Body, Space};
+///
+/// let mut space = Space::new();
+/// let wall = space.insert(Aabb::cube([0.0; 3], 1.0), Body::fixed())?;
+/// let player = space.insert(Aabb::cube([5.0, 0.0, 0.0], 1.0), Body::default())?;
+/// space.update()?;
+/// assert!(space.pairs().is_empty());
+///
+/// space.set(player, Aabb::cube([1.5, 0.0, 0.0], 1.0))?;
+/// space.update()?;
+/// assert_eq!(space.begun(), [(wall, player)]);
+///
+/// space.remove(wall)?;
+/// space.update()?;
+/// assert_eq!(space.ended(), [(wall, player)]);
+/// # Ok::<(), sapwise::Error>(())
+/// ```
+///
+/// Every call takes effect at the next [`update`](Self::update); until then, [`pairs`](Self::pairs) and the other
+/// lists show the last one. A call that fails changes nothing.
+///
+/// [`pairs`](Self::pairs), [`begun`](Self::begun) and [`ended`](Self::ended) depend on the calls alone, not on the
+/// algorithm, the number of threads or the time: the same calls give the same lists in the same order.
+#[derive(Debug)]
+pub struct Space {
+    search: Adaptive,
+    slots: Slots,
+    active: Active,
+    resting: Resting,
+    neighbours: Neighbours,
+    /// Of the first pairs in `pairs`.
+    links: Links,
+    /// Number of updates.
+    update: u64,
+    /// Whether bodies may rest.
+    rests: bool,
+    /// The pairs of active bodies with all others, by slot, the lower one first: those of this update and of the
+    /// previous one, ascending.
+    keys: Vec<u64>,
+    before: Vec<u64>,
+    sorter: Sorter,
+    begun_keys: Vec<u64>,
+    ended_keys: Vec<u64>,
+    /// Those of resting bodies, then the others.
+    pairs: Vec<(Handle, Handle)>,
+    begun: Vec<(Handle, Handle)>,
+    ended: Vec<(Handle, Handle)>,
+}
+
+impl Default for Space {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Space {
+    /// Makes an empty space, with the [usual](Tuning::usual) tuning and one registry of its own.
+    #[must_use]
+    pub fn new() -> Self {
+        let registry = Registry::new();
+        let search = Adaptive::new(Tuning::usual(&registry), &registry);
+        Self::with(search.expect("the usual tuning has algorithms on one thread"))
+    }
+
+    /// Makes an empty space whose active bodies `search` finds.
+    #[must_use]
+    pub fn with(search: Adaptive) -> Self {
+        Self {
+            search,
+            slots: Slots::default(),
+            active: Active::default(),
+            resting: Resting::new(),
+            neighbours: Neighbours::default(),
+            links: Links::default(),
+            update: 0,
+            rests: false,
+            keys: Vec::new(),
+            before: Vec::new(),
+            sorter: Sorter::default(),
+            begun_keys: Vec::new(),
+            ended_keys: Vec::new(),
+            pairs: Vec::new(),
+            begun: Vec::new(),
+            ended: Vec::new(),
+        }
+    }
+
+    /// Returns what finds the pairs of active bodies, for its [decisions](Adaptive::last_decision).
+    #[must_use]
+    pub fn search(&self) -> &Adaptive {
+        &self.search
+    }
+
+    /// Returns what finds the pairs of active bodies, for its settings.
+    pub fn search_mut(&mut self) -> &mut Adaptive {
+        &mut self.search
+    }
+
+    /// Returns the number of bodies.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.slots.len()
+    }
+
+    /// Returns whether there is no body.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Makes room for `more` bodies.
+    ///
+    /// # Errors
+    /// [`Error::TooManyObjects`] and [`Error::OutOfMemory`].
+    pub fn reserve(&mut self, more: usize) -> Result<(), Error> {
+        self.slots.reserve(more)
+    }
+
+    /// Inserts a body.
+    ///
+    /// # Errors
+    /// [`Error::InvalidBox`] with index 0, [`Error::TooManyObjects`] and [`Error::OutOfMemory`].
+    pub fn insert(&mut self, aabb: Aabb, body: Body) -> Result<Handle, Error> {
+        Aabb::check(&[aabb], 0)?;
+        self.slots.reserve(1)?;
+        Ok(self.slots.insert(aabb, body))
+    }
+
+    /// Inserts a body like `body` for each box. Returns their handles, in the order of the boxes.
+    ///
+    /// # Errors
+    /// As [`insert`](Self::insert), with the index of the first invalid box. Then none is inserted.
+    pub fn insert_all(&mut self, boxes: &[Aabb], body: Body) -> Result<Vec<Handle>, Error> {
+        Aabb::check(boxes, 0)?;
+        self.slots.reserve(boxes.len())?;
+        Ok(boxes.iter().map(|&aabb| self.slots.insert(aabb, body)).collect())
+    }
+
+    /// Sets the box of a body.
+    ///
+    /// # Errors
+    /// [`Error::StaleHandle`], and [`Error::InvalidBody`].
+    pub fn set(&mut self, handle: Handle, aabb: Aabb) -> Result<(), Error> {
+        let slot = self.slots.find(handle)?;
+        aabb.defect().map_or(Ok(()), |defect| Err(Error::InvalidBody { handle, defect }))?;
+        self.slots.set(slot, aabb);
+        Ok(())
+    }
+
+    /// Sets the box of each of these bodies.
+    ///
+    /// # Errors
+    /// As [`set`](Self::set), for the first body with one. Then none is set.
+    ///
+    /// # Panics
+    /// If there are not as many boxes as handles.
+    pub fn set_all(&mut self, handles: &[Handle], boxes: &[Aabb]) -> Result<(), Error> {
+        assert_eq!(handles.len(), boxes.len(), "one box for each handle");
+        for (&handle, aabb) in handles.iter().zip(boxes) {
+            self.slots.find(handle)?;
+            aabb.defect().map_or(Ok(()), |defect| Err(Error::InvalidBody { handle, defect }))?;
+        }
+        handles.iter().zip(boxes).for_each(|(handle, &aabb)| self.slots.set(handle.slot(), aabb));
+        Ok(())
+    }
+
+    /// Sets what a body may meet. Pairs begin and end by that too.
+    ///
+    /// # Errors
+    /// [`Error::StaleHandle`].
+    pub fn set_body(&mut self, handle: Handle, body: Body) -> Result<(), Error> {
+        let slot = self.slots.find(handle)?;
+        self.slots.set_body(slot, body);
+        Ok(())
+    }
+
+    /// Removes a body. Its pairs end at the next update.
+    ///
+    /// # Errors
+    /// [`Error::StaleHandle`].
+    pub fn remove(&mut self, handle: Handle) -> Result<(), Error> {
+        let slot = self.slots.find(handle)?;
+        self.slots.remove(slot);
+        Ok(())
+    }
+
+    /// Removes these bodies, each given once.
+    ///
+    /// # Errors
+    /// [`Error::StaleHandle`] for the first stale one. Then none is removed.
+    pub fn remove_all(&mut self, handles: &[Handle]) -> Result<(), Error> {
+        handles.iter().try_for_each(|&handle| self.slots.find(handle).map(drop))?;
+        for &handle in handles {
+            // A handle given twice is stale the second time.
+            if let Ok(slot) = self.slots.find(handle) {
+                self.slots.remove(slot);
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns whether there is a body with this handle.
+    #[must_use]
+    pub fn contains(&self, handle: Handle) -> bool {
+        self.slots.find(handle).is_ok()
+    }
+
+    /// Returns the box and the body of a handle, as set last; `None` if it is stale.
+    #[must_use]
+    pub fn get(&self, handle: Handle) -> Option<(&Aabb, &Body)> {
+        let slot = self.slots.find(handle).ok()?;
+        Some((&self.slots.boxes()[slot as usize], self.slots.body(slot)))
+    }
+
+    /// Iterates over the handles of all bodies, ascending.
+    pub fn handles(&self) -> impl Iterator<Item = Handle> {
+        self.slots.handles()
+    }
+
+    /// Finds all pairs, and which began and ended since the previous update.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`] and [`Error::Unavailable`]. Then no pair has begun or ended, those of active bodies are
+    /// missing, and the next update compares with the last one that succeeded.
+    pub fn update(&mut self) -> Result<(), Error> {
+        let changes = self.slots.take_changes();
+        let done = self.run(&changes);
+        if done.is_ok() {
+            self.slots.settle(changes);
+        } else {
+            self.slots.give_back(changes);
+            self.pairs.truncate(self.links.len());
+        }
+        done
+    }
+
+    /// Returns the pairs of bodies that overlap and may meet, each once, the lower handle first. Touching bodies
+    /// overlap.
+    ///
+    /// The order depends on the calls that were made. For an order that depends on the pairs alone, sort them.
+    #[must_use]
+    pub fn pairs(&self) -> &[(Handle, Handle)] {
+        &self.pairs
+    }
+
+    /// Returns the pairs that the previous update did not have, ascending.
+    #[must_use]
+    pub fn begun(&self) -> &[(Handle, Handle)] {
+        &self.begun
+    }
+
+    /// Returns the pairs of the previous update that there are no more, ascending. Those of removed bodies are among
+    /// them.
+    #[must_use]
+    pub fn ended(&self) -> &[(Handle, Handle)] {
+        &self.ended
+    }
+}

@@ -1,0 +1,74 @@
+//! What a body may meet.
+
+use crate::filter::Membership;
+
+/// What a body of a [`Space`](crate::Space) may meet, and a number of the caller's.
+///
+/// ```
+/// use sapwise::Body;
+///
+/// let wall = Body::fixed();
+/// let player = Body::default().groups(1).masks(6).user_data(42);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct Body {
+    pub(super) membership: Membership,
+    /// Whether it is expected to move, although it counts as fixed for the filter.
+    kinematic: bool,
+    user_data: u64,
+}
+
+impl Body {
+    /// Makes a body that meets no other fixed or kinematic body. Use it for what rarely moves: walls, the ground. It
+    /// may be [set](crate::Space::set) all the same.
+    #[must_use]
+    pub fn fixed() -> Self {
+        Self { membership: Membership { fixed: true, ..Membership::ALL }, ..Self::default() }
+    }
+
+    /// Makes a body that the program moves along a path, such as a lift. It meets no fixed body and no other kinematic
+    /// one.
+    #[must_use]
+    pub fn kinematic() -> Self {
+        Self { kinematic: true, ..Self::fixed() }
+    }
+
+    /// Sets the groups of the body, one bit each. The default is all.
+    #[must_use]
+    pub fn groups(mut self, groups: u32) -> Self {
+        self.membership.groups = groups;
+        self
+    }
+
+    /// Sets the groups that the body meets, one bit each. The masks of both bodies of a pair must allow the other. The
+    /// default is all.
+    #[must_use]
+    pub fn masks(mut self, masks: u32) -> Self {
+        self.membership.mask = masks;
+        self
+    }
+
+    /// Sets a number of the caller's, which the space keeps.
+    #[must_use]
+    pub fn user_data(mut self, user_data: u64) -> Self {
+        self.user_data = user_data;
+        self
+    }
+
+    /// Returns the number set by [`user_data`](Self::user_data), 0 by default.
+    #[must_use]
+    pub fn get_user_data(&self) -> u64 {
+        self.user_data
+    }
+
+    /// Returns whether the body rests at once, and not only after some frames in which it was not set.
+    pub(super) fn rests_at_once(&self) -> bool {
+        self.membership.fixed && !self.kinematic
+    }
+
+    /// Returns the groups, the mask and whether the body is fixed or kinematic.
+    #[must_use]
+    pub fn membership(&self) -> &Membership {
+        &self.membership
+    }
+}

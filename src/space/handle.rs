@@ -1,0 +1,50 @@
+//! The name of a body.
+
+use std::fmt;
+use std::num::NonZeroU64;
+
+/// Names a body of a [`Space`](crate::Space), until it is removed. A handle is never used again for another body, unless
+/// its slot has had four billion of them.
+///
+/// 64 bits: slot, then generation. Handles sort by slot. 0 is no handle, so `Option<Handle>` has 64 bits too.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Handle(NonZeroU64);
+
+impl Handle {
+    /// `generation` is not 0.
+    pub(super) fn new(slot: u32, generation: u32) -> Self {
+        Self(NonZeroU64::MIN.saturating_add((u64::from(slot) << 32 | u64::from(generation)) - 1))
+    }
+
+    /// Returns the 64 bits of the handle.
+    #[must_use]
+    pub fn to_bits(self) -> u64 {
+        self.0.get()
+    }
+
+    /// Returns the handle with these bits, `None` for 0. A space reports one that it did not make as stale.
+    #[must_use]
+    pub fn from_bits(bits: u64) -> Option<Self> {
+        NonZeroU64::new(bits).map(Self)
+    }
+
+    pub(super) fn slot(self) -> u32 {
+        (self.0.get() >> 32) as u32
+    }
+
+    pub(super) fn generation(self) -> u32 {
+        self.0.get() as u32
+    }
+}
+
+impl fmt::Debug for Handle {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Handle({}v{})", self.slot(), self.generation())
+    }
+}
+
+impl fmt::Display for Handle {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}v{}", self.slot(), self.generation())
+    }
+}

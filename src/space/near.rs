@@ -1,0 +1,94 @@
+//! The resting bodies near each active one, kept while that stays within its fat AABB.
+
+use super::resting::Resting;
+use crate::aabb::Aabb;
+
+/// Margin of a fat AABB, in mean edges of the body.
+const MARGIN: f32 = 0.25;
+
+/// The neighbours of one body.
+#[derive(Debug, Clone, Copy)]
+struct Near {
+    /// The body they are of.
+    slot: u32,
+    /// [`Resting::epoch`] when they were found; 0: never.
+    epoch: u64,
+    fat: Aabb,
+    first: usize,
+    len: u32,
+}
+
+/// See the module. Element `k` is of the active body at position `k`.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Neighbours {
+    near: Vec<Near>,
+    slots: Vec<u32>,
+    /// Elements of `slots` that belong to no body any more.
+    waste: usize,
+}
+
+impl Neighbours {
+    pub(super) fn clear(&mut self) {
+        self.near.clear();
+        self.slots.clear();
+        self.waste = 0;
+    }
+
+    /// Calls `found` with the position of each active body and each resting one that may overlap it, among them all
+    /// that do. Those that have woken since may be called too.
+    pub(super) fn each(
+        &mut self,
+        resting: &mut Resting,
+        actives: &[u32],
+        boxes: &[Aabb],
+        mut found: impl FnMut(usize, u32),
+    ) {
+        self.compact(actives);
+        let Self { near, slots, waste } = self;
+        for (at, (near, b)) in near.iter_mut().zip(boxes).enumerate() {
+            let stays = near.epoch == resting.epoch()
+                && (0..3).all(|a| near.fat.min[a] <= b.min[a] && b.max[a] <= near.fat.max[a]);
+            if !stays {
+                *waste += near.len as usize;
+                near.fat = fat(b);
+                near.first = slots.len();
+                resting.overlapping(&near.fat, |slot| slots.push(slot));
+                near.len = (slots.len() - near.first) as u32;
+                near.epoch = resting.epoch();
+            }
+            slots[near.first..][..near.len as usize].iter().for_each(|&slot| found(at, slot));
+        }
+    }
+
+    /// Brings the lists into the order of these bodies. What is kept of others goes.
+    fn compact(&mut self, actives: &[u32]) {
+        let Self { near, slots, waste } = self;
+        let nothing = |slot| Near { slot, epoch: 0, fat: Aabb::default(), first: 0, len: 0 };
+        *waste += near.drain(near.len().min(actives.len())..).map(|near| near.len as usize).sum::<usize>();
+        let known = near.len();
+        near.extend(actives[known..].iter().map(|&slot| nothing(slot)));
+        for (near, &slot) in near.iter_mut().zip(actives) {
+            if near.slot != slot {
+                *waste += near.len as usize;
+                *near = nothing(slot);
+            }
+        }
+        if *waste > slots.len() / 2 + 1024 {
+            let mut kept = Vec::with_capacity(slots.len() - *waste);
+            for near in near {
+                let first = kept.len();
+                kept.extend_from_slice(&slots[near.first..][..near.len as usize]);
+                near.first = first;
+            }
+            (*slots, *waste) = (kept, 0);
+        }
+    }
+}
+
+/// Grows a box. The result contains it, because rounding is monotonic.
+fn fat(b: &Aabb) -> Aabb {
+    let mean = (0..3).map(|a| b.max[a] - b.min[a]).sum::<f32>() / 3.0;
+    // An infinite box is its own fat box.
+    let by = if mean.is_finite() { MARGIN * mean } else { 0.0 };
+    Aabb { min: b.min.map(|v| v - by), max: b.max.map(|v| v + by) }
+}

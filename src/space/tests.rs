@@ -1,0 +1,206 @@
+use super::*;
+use crate::algorithm::AlgorithmId;
+use crate::error::BoxDefect;
+use crate::splitmix::mix;
+use std::collections::BTreeSet;
+
+type Set = BTreeSet<(Handle, Handle)>;
+
+/// Random numbers.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self, end: usize) -> usize {
+        self.0 += 1;
+        (mix(self.0) % end as u64) as usize
+    }
+
+    fn unit(&mut self) -> f32 {
+        self.next(1 << 20) as f32 / (1 << 20) as f32
+    }
+
+    /// Returns a box in a world of this size. Some are flat, some unbounded.
+    fn aabb(&mut self, world: f32) -> Aabb {
+        let centre = [0; 3].map(|_| self.unit() * world);
+        let mut b = Aabb::cube(centre, 0.3 + 0.4 * self.unit());
+        match self.next(400) {
+            0 => (b.min[1], b.max[0]) = (f32::NEG_INFINITY, f32::INFINITY),
+            1 => b.max[2] = b.min[2],
+            _ => {}
+        }
+        b
+    }
+
+    fn body(&mut self) -> Body {
+        match self.next(8) {
+            0 => Body::fixed(),
+            1 => Body::kinematic(),
+            2 => Body::default().groups(1 << self.next(3)).masks(self.next(8) as u32),
+            _ => Body::default(),
+        }
+    }
+}
+
+/// Returns all pairs of a space by a double loop.
+fn double_loop(space: &Space) -> Set {
+    let all: Vec<_> = space.handles().map(|h| (h, space.get(h).unwrap())).collect();
+    let mut pairs = Set::new();
+    for (k, &(one, (a, body))) in all.iter().enumerate() {
+        for &(other, (b, another)) in &all[..k] {
+            if a.overlaps(b) && body.membership().wants(another.membership()) {
+                pairs.insert((other, one));
+            }
+        }
+    }
+    pairs
+}
+
+/// Updates, and compares all lists with what they should be.
+fn check(space: &mut Space, before: &mut Set, what: &str) {
+    let expected = double_loop(space);
+    space.update().unwrap();
+    let found: Set = space.pairs().iter().copied().collect();
+    assert_eq!(found.len(), space.pairs().len(), "{what}: a pair twice");
+    assert!(found == expected, "{what}: {} pairs, not {}", found.len(), expected.len());
+    let begun: Vec<_> = expected.difference(before).copied().collect();
+    let ended: Vec<_> = before.difference(&expected).copied().collect();
+    assert!(space.begun() == begun && space.ended() == ended, "{what}: begun or ended");
+    *before = expected;
+}
+
+/// Inserts, sets and removes at random; at times most bodies rest, and at times all wake.
+fn random_calls(space: &mut Space, seed: u64, mut look: impl FnMut(&mut Space, usize)) -> [bool; 2] {
+    let mut random = Random(seed << 32);
+    let mut handles: Vec<Handle> = (0..300).map(|_| space.insert(random.aabb(9.0), random.body()).unwrap()).collect();
+    let mut rested = [false; 2];
+    for frame in 0..160 {
+        let moving = match frame / 40 {
+            0 | 2 => handles.len(),
+            1 => 8,
+            _ => 20,
+        };
+        for _ in 0..moving {
+            let handle = handles[if frame % 40 < 30 { random.next(moving) } else { random.next(handles.len()) }];
+            let mut b = *space.get(handle).unwrap().0;
+            let by = [0; 3].map(|_| random.unit() * 0.2 - 0.1);
+            (0..3).for_each(|a| (b.min[a], b.max[a]) = (b.min[a] + by[a], b.max[a] + by[a]));
+            space.set(handle, b).unwrap();
+        }
+        for _ in 0..random.next(4) {
+            match random.next(5) {
+                0 => {
+                    let at = random.next(handles.len());
+                    space.remove(handles.swap_remove(at)).unwrap();
+                }
+                1 => handles.push(space.insert(random.aabb(9.0), random.body()).unwrap()),
+                2 => {
+                    // Gone before any update has seen it.
+                    let gone = space.insert(random.aabb(9.0), random.body()).unwrap();
+                    space.remove(gone).unwrap();
+                }
+                3 => space.set_body(handles[random.next(handles.len())], random.body()).unwrap(),
+                _ => space.set(handles[random.next(handles.len())], random.aabb(9.0)).unwrap(),
+            }
+        }
+        look(space, frame);
+        rested[usize::from(space.resting.len() > 0)] = true;
+    }
+    rested
+}
+
+fn only(algorithm: &str) -> Space {
+    let id: AlgorithmId = algorithm.parse().unwrap();
+    Space::with(Adaptive::only(id, &Registry::new()).unwrap())
+}
+
+#[test]
+fn random_calls_give_the_pairs_of_a_double_loop() {
+    for seed in 0..6 {
+        let (mut space, mut before) = (Space::new(), Set::new());
+        let rested =
+            random_calls(&mut space, seed, |space, frame| check(space, &mut before, &format!("{seed}, {frame}")));
+        assert_eq!(rested, [true; 2]);
+    }
+}
+
+#[test]
+fn lists_depend_on_the_calls_alone() {
+    let lists = |mut space: Space| {
+        let mut lists = Vec::new();
+        random_calls(&mut space, 77, |space, _| {
+            space.update().unwrap();
+            lists.push([space.pairs().to_vec(), space.begun().to_vec(), space.ended().to_vec()]);
+        });
+        lists
+    };
+    let first = lists(Space::new());
+    for algorithm in ["brute@cpu1", "sap@cpu1", "pair-cache@cpu1"] {
+        assert!(lists(only(algorithm)) == first, "{algorithm}");
+    }
+}
+
+#[test]
+fn bodies_that_are_not_set_rest_and_wake() {
+    let mut space = Space::new();
+    let grid = |k: usize| Aabb::cube([(k % 40) as f32, (k / 40) as f32, 0.0], 0.5);
+    let boxes: Vec<Aabb> = (0..1600).map(grid).collect();
+    let handles = space.insert_all(&boxes, Body::default()).unwrap();
+    space.update().unwrap();
+    let all = space.pairs().len();
+    for _ in 0..=IDLE {
+        space.set(handles[0], boxes[0]).unwrap();
+        space.update().unwrap();
+        assert_eq!((space.pairs().len(), space.begun(), space.ended()), (all, &[][..], &[][..]));
+    }
+    assert_eq!((space.active.len(), space.resting.len(), space.links.len()), (1, 1599, all - 3));
+    // One that wakes without a change keeps its pairs.
+    space.set(handles[41], boxes[41]).unwrap();
+    space.update().unwrap();
+    assert_eq!((space.active.len(), space.pairs().len(), space.begun().len()), (2, all, 0));
+    space.remove(handles[82]).unwrap();
+    space.update().unwrap();
+    assert_eq!((space.pairs().len(), space.ended().len()), (all - 8, 8));
+    assert!(space.ended().iter().all(|&(a, b)| a == handles[82] || b == handles[82]));
+    space.set_all(&handles[..82], &boxes[..82]).unwrap();
+    space.set_all(&handles[83..], &boxes[83..]).unwrap();
+    space.update().unwrap();
+    assert_eq!((space.resting.len(), space.pairs().len(), space.links.len()), (0, all - 8, 0));
+}
+
+#[test]
+fn call_that_fails_changes_nothing() {
+    let mut space = Space::new();
+    let unit = Aabb::cube([0.0; 3], 1.0);
+    let one = space.insert(unit, Body::default()).unwrap();
+    let gone = space.insert(unit, Body::default()).unwrap();
+    space.update().unwrap();
+    space.remove(gone).unwrap();
+    let stale = Err(Error::StaleHandle { handle: gone });
+    let nan = Aabb::new([f32::NAN; 3], [1.0; 3]);
+    let inverted = Aabb::new([2.0; 3], [1.0; 3]);
+    let other = Aabb::cube([9.0; 3], 1.0);
+    for _ in 0..2 {
+        assert_eq!(space.set(gone, unit), stale);
+        assert_eq!(space.set_body(gone, Body::fixed()), stale);
+        assert_eq!(space.remove(gone), stale);
+        assert_eq!(space.set_all(&[one, gone], &[other; 2]), stale);
+        assert_eq!(space.remove_all(&[one, gone]), stale);
+        assert!(!space.contains(gone) && space.get(gone).is_none());
+        let defect = BoxDefect::NotANumber;
+        assert_eq!(space.set(one, nan), Err(Error::InvalidBody { handle: one, defect }));
+        assert_eq!(space.insert_all(&[unit, nan], Body::fixed()), Err(Error::InvalidBox { index: 1, defect }));
+        let defect = BoxDefect::Inverted;
+        assert_eq!(space.set_all(&[one, one], &[other, inverted]), Err(Error::InvalidBody { handle: one, defect }));
+        assert_eq!(space.insert(inverted, Body::fixed()), Err(Error::InvalidBox { index: 0, defect }));
+        assert_eq!((space.len(), space.get(one)), (1, Some((&unit, &Body::default()))));
+        space.update().unwrap();
+    }
+    // The slot is used again, the handle is not.
+    let again = space.insert(unit, Body::default()).unwrap();
+    assert!(again != gone && again.slot() == gone.slot());
+    assert_eq!(space.set(gone, unit), stale);
+    assert_eq!(Handle::from_bits(again.to_bits()), Some(again));
+    assert_eq!((Handle::from_bits(0), size_of::<Option<Handle>>()), (None, 8));
+    let foreign = Handle::from_bits(u64::MAX).unwrap();
+    assert_eq!(space.remove(foreign), Err(Error::StaleHandle { handle: foreign }));
+}

@@ -1,0 +1,175 @@
+//! The steps of an update.
+
+use super::{FEWEST, Handle, IDLE, MANY, Space};
+use crate::broad_phase::BroadPhase;
+use crate::changes::differences;
+use crate::error::Error;
+use crate::pairs::Alone;
+use crate::space::slots::At;
+
+/// Makes the key of a pair of slots, the lower one in the upper half.
+fn key(a: u32, b: u32) -> u64 {
+    u64::from(a.min(b)) << 32 | u64::from(a.max(b))
+}
+
+/// Returns the slots of a key.
+fn slots(key: u64) -> (u32, u32) {
+    ((key >> 32) as u32, key as u32)
+}
+
+impl Space {
+    /// The update, but for the list of changes.
+    pub(super) fn run(&mut self, changes: &[u32]) -> Result<(), Error> {
+        self.update += 1;
+        self.pairs.truncate(self.links.len());
+        self.begun.clear();
+        self.ended.clear();
+        self.rest();
+        let known = self.before.len();
+        self.apply(changes);
+        if self.rests && self.active.len() * MANY > 2 * self.resting.len() {
+            self.wake_all();
+        }
+        if self.before.len() > known {
+            self.sorter.sort(&Alone, &mut self.before);
+        }
+        self.find()?;
+        self.compare()
+    }
+
+    /// Lets bodies rest that were not set for some updates, if they are many.
+    fn rest(&mut self) {
+        let Self { active, slots, update, .. } = self;
+        let idle = |at: usize| active.set_in()[at] + IDLE <= *update && !slots.is_changed(active.slots()[at]);
+        let first = (0..active.len()).find(|&at| idle(at));
+        let Some(first) = first else { return };
+        if !self.rests {
+            let idle = (first..active.len()).filter(|&at| idle(at)).count();
+            self.rests = idle > FEWEST.max(MANY * (active.len() - idle));
+        }
+        if !self.rests {
+            return;
+        }
+        let resting: Vec<u32> = (first..active.len()).filter(|&at| idle(at)).map(|at| active.slots()[at]).collect();
+        for &slot in &resting {
+            self.leave_active(slot);
+            self.slots.set_at(slot, At::Resting);
+            self.resting.add(slot);
+        }
+        // Their pairs with each other move to those that stay.
+        let Self { before, slots, links, pairs, .. } = self;
+        before.retain(|&key| {
+            let (a, b) = self::slots(key);
+            let stays = slots.at(a) == At::Resting && slots.at(b) == At::Resting;
+            if stays {
+                links.add((slots.handle(a), slots.handle(b)), pairs);
+            }
+            !stays
+        });
+    }
+
+    /// Does what the caller has asked for since the previous update.
+    fn apply(&mut self, changes: &[u32]) {
+        for &slot in changes {
+            let removed = self.slots.is_removed(slot);
+            match self.slots.at(slot) {
+                At::Active(at) if !removed => {
+                    let update = self.set_in(slot);
+                    let aabb = self.slots.boxes()[slot as usize];
+                    self.active.set(at as usize, aabb, self.slots.body(slot), update);
+                    continue;
+                }
+                At::Active(_) => self.leave_active(slot),
+                At::Resting => self.leave_resting(slot),
+                At::New | At::Free => {}
+            }
+            if removed {
+                // The slot stays taken until its pairs have ended.
+                self.slots.set_at(slot, At::New);
+            } else {
+                self.activate(slot);
+            }
+        }
+    }
+
+    /// Returns the update in which a body that is set now counts as set.
+    fn set_in(&self, slot: u32) -> u64 {
+        if self.slots.body(slot).rests_at_once() { self.update.saturating_sub(IDLE) } else { self.update }
+    }
+
+    fn activate(&mut self, slot: u32) {
+        self.slots.set_at(slot, At::Active(self.active.len() as u32));
+        let aabb = self.slots.boxes()[slot as usize];
+        self.active.push(slot, aabb, self.slots.body(slot), self.set_in(slot));
+    }
+
+    fn leave_active(&mut self, slot: u32) {
+        let At::Active(at) = self.slots.at(slot) else { return };
+        if let Some(moved) = self.active.swap_remove(at as usize) {
+            self.slots.set_at(moved, At::Active(at));
+        }
+    }
+
+    /// Takes a body out of the resting ones. Its pairs with these are compared with those of this update.
+    fn leave_resting(&mut self, slot: u32) {
+        self.resting.remove(slot);
+        let Self { links, pairs, before, .. } = self;
+        links.remove_all(slot, pairs, |a, b| before.push(key(a, b)));
+    }
+
+    /// Lets no body rest any more.
+    fn wake_all(&mut self) {
+        self.rests = false;
+        for slot in 0..self.slots.boxes().len() as u32 {
+            if self.slots.at(slot) == At::Resting {
+                self.activate(slot);
+            }
+        }
+        self.resting.clear();
+        self.before.extend(self.links.drain().map(|[a, b]| key(a, b)));
+        self.pairs.clear();
+        self.neighbours.clear();
+    }
+
+    /// Finds the pairs of active bodies.
+    fn find(&mut self) -> Result<(), Error> {
+        let Self { search, slots, active, resting, neighbours, keys, sorter, .. } = self;
+        let (boxes, pairs) = active.search();
+        search.find_pairs(boxes, pairs)?;
+        keys.clear();
+        let of = active.slots();
+        keys.extend(active.pairs().iter().map(|&(a, b)| key(of[a as usize], of[b as usize])));
+        resting.update(slots)?;
+        if resting.len() > 0 {
+            let boxes = active.boxes();
+            neighbours.each(resting, of, boxes, |at, other| {
+                let one = of[at];
+                let meet = slots.at(other) == At::Resting
+                    && boxes[at].overlaps(&slots.boxes()[other as usize])
+                    && slots.body(one).membership().wants(slots.body(other).membership());
+                if meet {
+                    keys.push(key(one, other));
+                }
+            });
+        }
+        sorter.sort(&Alone, keys);
+        Ok(())
+    }
+
+    /// Compares the pairs with those of the previous update.
+    fn compare(&mut self) -> Result<(), Error> {
+        let Self { slots, keys, before, begun_keys, ended_keys, pairs, begun, ended, .. } = self;
+        begun_keys.clear();
+        ended_keys.clear();
+        differences(keys, before, begun_keys, ended_keys)?;
+        let handles = |&key: &u64| -> (Handle, Handle) {
+            let (a, b) = self::slots(key);
+            (slots.handle(a), slots.handle(b))
+        };
+        begun.extend(begun_keys.iter().map(handles));
+        ended.extend(ended_keys.iter().map(handles));
+        pairs.extend(keys.iter().map(handles));
+        std::mem::swap(keys, before);
+        Ok(())
+    }
+}
