@@ -45,20 +45,26 @@ impl Active {
     }
 
     pub(super) fn push(&mut self, slot: u32, aabb: Aabb, body: &Body, update: u64) {
-        self.note(self.slots.len(), body);
+        self.set_body(self.slots.len(), body);
         self.slots.push(slot);
         self.boxes.push(aabb);
         self.set_in.push(update);
     }
 
-    pub(super) fn set(&mut self, at: usize, aabb: Aabb, body: &Body, update: u64) {
-        self.note(at, body);
+    /// Puts another body in the place of one.
+    pub(super) fn replace(&mut self, at: usize, slot: u32, aabb: Aabb, body: &Body, update: u64) {
+        self.slots[at] = slot;
+        self.set_body(at, body);
+        self.set(at, aabb, update);
+    }
+
+    pub(super) fn set(&mut self, at: usize, aabb: Aabb, update: u64) {
         self.boxes[at] = aabb;
         self.set_in[at] = update;
     }
 
     /// Writes the membership of a body to the filter.
-    fn note(&mut self, at: usize, body: &Body) {
+    pub(super) fn set_body(&mut self, at: usize, body: &Body) {
         let membership = body.membership;
         if self.pairs.filter().is_none() {
             if membership == Membership::ALL {

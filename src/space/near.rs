@@ -6,6 +6,14 @@ use crate::aabb::Aabb;
 /// Margin of a fat AABB, in mean edges of the body.
 const MARGIN: f32 = 0.25;
 
+/// A resting body.
+#[derive(Debug, Clone, Copy)]
+struct Neighbour {
+    /// Its box, beside the slot, so that most frames look nowhere else.
+    aabb: Aabb,
+    slot: u32,
+}
+
 /// The neighbours of one body.
 #[derive(Debug, Clone, Copy)]
 struct Near {
@@ -22,47 +30,49 @@ struct Near {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Neighbours {
     near: Vec<Near>,
-    slots: Vec<u32>,
-    /// Elements of `slots` that belong to no body any more.
+    neighbours: Vec<Neighbour>,
+    /// Elements of `neighbours` that belong to no body any more.
     waste: usize,
 }
 
 impl Neighbours {
     pub(super) fn clear(&mut self) {
         self.near.clear();
-        self.slots.clear();
+        self.neighbours.clear();
         self.waste = 0;
     }
 
-    /// Calls `found` with the position of each active body and each resting one that may overlap it, among them all
-    /// that do. Those that have woken since may be called too.
+    /// Calls `found` with the position of each active body and the slot of each resting one that overlaps it.
+    /// `boxes_at` are by slot. Those that have woken since may be called too.
     pub(super) fn each(
         &mut self,
         resting: &mut Resting,
-        actives: &[u32],
-        boxes: &[Aabb],
+        boxes_at: &[Aabb],
+        (actives, boxes): (&[u32], &[Aabb]),
         mut found: impl FnMut(usize, u32),
     ) {
         self.compact(actives);
-        let Self { near, slots, waste } = self;
+        let Self { near, neighbours, waste } = self;
         for (at, (near, b)) in near.iter_mut().zip(boxes).enumerate() {
             let stays = near.epoch == resting.epoch()
                 && (0..3).all(|a| near.fat.min[a] <= b.min[a] && b.max[a] <= near.fat.max[a]);
             if !stays {
                 *waste += near.len as usize;
                 near.fat = fat(b);
-                near.first = slots.len();
-                resting.overlapping(&near.fat, |slot| slots.push(slot));
-                near.len = (slots.len() - near.first) as u32;
+                near.first = neighbours.len();
+                let add = |slot| neighbours.push(Neighbour { aabb: boxes_at[slot as usize], slot });
+                resting.overlapping(&near.fat, add);
+                near.len = (neighbours.len() - near.first) as u32;
                 near.epoch = resting.epoch();
             }
-            slots[near.first..][..near.len as usize].iter().for_each(|&slot| found(at, slot));
+            let near = neighbours[near.first..][..near.len as usize].iter();
+            near.filter(|near| near.aabb.overlaps(b)).for_each(|near| found(at, near.slot));
         }
     }
 
     /// Brings the lists into the order of these bodies. What is kept of others goes.
     fn compact(&mut self, actives: &[u32]) {
-        let Self { near, slots, waste } = self;
+        let Self { near, neighbours, waste } = self;
         let nothing = |slot| Near { slot, epoch: 0, fat: Aabb::default(), first: 0, len: 0 };
         *waste += near.drain(near.len().min(actives.len())..).map(|near| near.len as usize).sum::<usize>();
         let known = near.len();
@@ -73,14 +83,14 @@ impl Neighbours {
                 *near = nothing(slot);
             }
         }
-        if *waste > slots.len() / 2 + 1024 {
-            let mut kept = Vec::with_capacity(slots.len() - *waste);
+        if *waste > neighbours.len() / 2 + 1024 {
+            let mut kept = Vec::with_capacity(neighbours.len() - *waste);
             for near in near {
                 let first = kept.len();
-                kept.extend_from_slice(&slots[near.first..][..near.len as usize]);
+                kept.extend_from_slice(&neighbours[near.first..][..near.len as usize]);
                 near.first = first;
             }
-            (*slots, *waste) = (kept, 0);
+            (*neighbours, *waste) = (kept, 0);
         }
     }
 }

@@ -18,25 +18,23 @@ pub(super) enum At {
     Resting,
 }
 
-#[derive(Debug, Clone, Copy)]
-struct Slot {
-    generation: u32,
-    at: At,
-    /// The slot is in the list of changes.
-    changed: bool,
-    /// The body was removed since the last update.
-    removed: bool,
-}
+/// What was done to a body since the last update: one bit each.
+pub(super) const SET: u8 = 1;
+pub(super) const SET_BODY: u8 = 2;
+const INSERTED: u8 = 4;
+pub(super) const REMOVED: u8 = 8;
 
-/// See the module.
+/// See the module. Each list but the last two is by slot.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Slots {
-    slots: Vec<Slot>,
+    generations: Vec<u32>,
+    at: Vec<At>,
+    done: Vec<u8>,
     boxes: Vec<Aabb>,
     bodies: Vec<Body>,
     /// Slots without a body.
     free: Vec<u32>,
-    /// Slots that were inserted, set or removed since the last update, each once.
+    /// Slots to which something was done since the last update, each once.
     changed: Vec<u32>,
     /// Number of bodies.
     len: usize,
@@ -49,26 +47,36 @@ impl Slots {
 
     pub(super) fn reserve(&mut self, more: usize) -> Result<(), Error> {
         let room = more.saturating_sub(self.free.len());
-        let most = self.slots.len() + room;
+        let most = self.boxes.len() + room;
         if u32::try_from(most).is_err() {
             return Err(Error::TooManyObjects { objects: most });
         }
         let refused = |_| Error::OutOfMemory { what: "bodies", elements: most };
-        self.slots.try_reserve(room).map_err(refused)?;
+        self.generations.try_reserve(room).map_err(refused)?;
+        self.at.try_reserve(room).map_err(refused)?;
+        self.done.try_reserve(room).map_err(refused)?;
         self.boxes.try_reserve(room).map_err(refused)?;
         self.bodies.try_reserve(room).map_err(refused)?;
         self.changed.try_reserve(more).map_err(refused)
     }
 
     /// Returns the slot of a handle.
+    #[inline]
     pub(super) fn find(&self, handle: Handle) -> Result<u32, Error> {
-        let right = |s: &&Slot| s.generation == handle.generation() && s.at != At::Free && !s.removed;
-        let slot = self.slots.get(handle.slot() as usize).filter(right);
-        slot.map(|_| handle.slot()).ok_or(Error::StaleHandle { handle })
+        let slot = handle.slot();
+        let known = self.generations.get(slot as usize) == Some(&handle.generation()) && self.is_here(slot);
+        if known { Ok(slot) } else { Err(Error::StaleHandle { handle }) }
     }
 
+    /// Returns whether there is a body in a slot.
+    #[inline]
+    fn is_here(&self, slot: u32) -> bool {
+        self.at(slot) != At::Free && self.done(slot) & REMOVED == 0
+    }
+
+    #[inline]
     pub(super) fn handle(&self, slot: u32) -> Handle {
-        Handle::new(slot, self.slots[slot as usize].generation)
+        Handle::new(slot, self.generations[slot as usize])
     }
 
     /// Returns all boxes by slot. Those of free slots are unspecified.
@@ -80,61 +88,61 @@ impl Slots {
         &self.bodies[slot as usize]
     }
 
+    #[inline]
     pub(super) fn at(&self, slot: u32) -> At {
-        self.slots[slot as usize].at
+        self.at[slot as usize]
     }
 
     pub(super) fn set_at(&mut self, slot: u32, at: At) {
-        self.slots[slot as usize].at = at;
+        self.at[slot as usize] = at;
     }
 
-    pub(super) fn is_removed(&self, slot: u32) -> bool {
-        self.slots[slot as usize].removed
-    }
-
-    pub(super) fn is_changed(&self, slot: u32) -> bool {
-        self.slots[slot as usize].changed
+    /// Returns what was done to a body since the last update.
+    #[inline]
+    pub(super) fn done(&self, slot: u32) -> u8 {
+        self.done[slot as usize]
     }
 
     /// Inserts a body whose box is valid. There must be room.
     pub(super) fn insert(&mut self, aabb: Aabb, body: Body) -> Handle {
-        let new = Slot { generation: 1, at: At::New, changed: false, removed: false };
         let slot = self.free.pop().unwrap_or_else(|| {
-            self.slots.push(Slot { at: At::Free, ..new });
+            self.generations.push(1);
+            self.at.push(At::Free);
+            self.done.push(0);
             self.boxes.push(aabb);
             self.bodies.push(body);
-            (self.slots.len() - 1) as u32
+            (self.boxes.len() - 1) as u32
         });
         let at = slot as usize;
-        self.slots[at] = Slot { generation: self.slots[at].generation, ..new };
-        (self.boxes[at], self.bodies[at]) = (aabb, body);
+        (self.at[at], self.boxes[at], self.bodies[at]) = (At::New, aabb, body);
         self.len += 1;
-        self.change(slot);
+        self.note(slot, INSERTED);
         self.handle(slot)
     }
 
+    #[inline]
     pub(super) fn set(&mut self, slot: u32, aabb: Aabb) {
         self.boxes[slot as usize] = aabb;
-        self.change(slot);
+        self.note(slot, SET);
     }
 
     pub(super) fn set_body(&mut self, slot: u32, body: Body) {
         self.bodies[slot as usize] = body;
-        self.change(slot);
+        self.note(slot, SET_BODY);
     }
 
     pub(super) fn remove(&mut self, slot: u32) {
-        self.slots[slot as usize].removed = true;
         self.len -= 1;
-        self.change(slot);
+        self.note(slot, REMOVED);
     }
 
-    fn change(&mut self, slot: u32) {
-        let of = &mut self.slots[slot as usize];
-        if !of.changed {
-            of.changed = true;
+    #[inline]
+    fn note(&mut self, slot: u32, what: u8) {
+        let done = &mut self.done[slot as usize];
+        if *done == 0 {
             self.changed.push(slot);
         }
+        *done |= what;
     }
 
     /// Takes the list of changes, until [`settle`](Self::settle) or [`give_back`](Self::give_back).
@@ -150,12 +158,11 @@ impl Slots {
     /// Forgets the changes, and frees the slots of removed bodies.
     pub(super) fn settle(&mut self, mut changes: Vec<u32>) {
         for slot in changes.drain(..) {
-            let of = &mut self.slots[slot as usize];
-            of.changed = false;
-            if std::mem::take(&mut of.removed) {
-                of.at = At::Free;
+            let at = slot as usize;
+            if std::mem::take(&mut self.done[at]) & REMOVED != 0 {
+                self.at[at] = At::Free;
                 // 0 is no generation.
-                of.generation = of.generation.checked_add(1).unwrap_or(1);
+                self.generations[at] = self.generations[at].checked_add(1).unwrap_or(1);
                 self.free.push(slot);
             }
         }
@@ -164,7 +171,6 @@ impl Slots {
 
     /// Returns the handles of all bodies, by slot.
     pub(super) fn handles(&self) -> impl Iterator<Item = Handle> {
-        let here = |(_, s): &(u32, &Slot)| s.at != At::Free && !s.removed;
-        (0..).zip(&self.slots).filter(here).map(|(slot, s)| Handle::new(slot, s.generation))
+        (0..self.boxes.len() as u32).filter(|&slot| self.is_here(slot)).map(|slot| self.handle(slot))
     }
 }

@@ -5,7 +5,7 @@ use crate::broad_phase::BroadPhase;
 use crate::changes::differences;
 use crate::error::Error;
 use crate::pairs::Alone;
-use crate::space::slots::At;
+use crate::space::slots::{At, REMOVED, SET_BODY};
 
 /// Makes the key of a pair of slots, the lower one in the upper half.
 fn key(a: u32, b: u32) -> u64 {
@@ -40,7 +40,7 @@ impl Space {
     /// Lets bodies rest that were not set for some updates, if they are many.
     fn rest(&mut self) {
         let Self { active, slots, update, .. } = self;
-        let idle = |at: usize| active.set_in()[at] + IDLE <= *update && !slots.is_changed(active.slots()[at]);
+        let idle = |at: usize| active.set_in()[at] + IDLE <= *update && slots.done(active.slots()[at]) == 0;
         let first = (0..active.len()).find(|&at| idle(at));
         let Some(first) = first else { return };
         if !self.rests {
@@ -50,9 +50,11 @@ impl Space {
         if !self.rests {
             return;
         }
-        let resting: Vec<u32> = (first..active.len()).filter(|&at| idle(at)).map(|at| active.slots()[at]).collect();
-        for &slot in &resting {
-            self.leave_active(slot);
+        let resting: Vec<usize> = (first..active.len()).filter(|&at| idle(at)).collect();
+        // The highest first: then what takes the place of one does not rest itself.
+        for &at in resting.iter().rev() {
+            let slot = self.active.slots()[at];
+            self.leave_active(at as u32);
             self.slots.set_at(slot, At::Resting);
             self.resting.add(slot);
         }
@@ -70,26 +72,39 @@ impl Space {
 
     /// Does what the caller has asked for since the previous update.
     fn apply(&mut self, changes: &[u32]) {
+        // Newcomers take the places of active bodies that leave, so that few boxes change their position.
+        let mut left = Vec::new();
         for &slot in changes {
-            let removed = self.slots.is_removed(slot);
+            let done = self.slots.done(slot);
             match self.slots.at(slot) {
-                At::Active(at) if !removed => {
+                At::Active(at) if done & REMOVED == 0 => {
                     let update = self.set_in(slot);
-                    let aabb = self.slots.boxes()[slot as usize];
-                    self.active.set(at as usize, aabb, self.slots.body(slot), update);
-                    continue;
+                    self.active.set(at as usize, self.slots.boxes()[slot as usize], update);
+                    if done & SET_BODY != 0 {
+                        self.active.set_body(at as usize, self.slots.body(slot));
+                    }
                 }
-                At::Active(_) => self.leave_active(slot),
-                At::Resting => self.leave_resting(slot),
+                At::Active(at) => {
+                    left.push(at);
+                    // The slot stays taken until its pairs have ended.
+                    self.slots.set_at(slot, At::New);
+                }
+                At::Resting => {
+                    self.leave_resting(slot);
+                    self.slots.set_at(slot, At::New);
+                }
                 At::New | At::Free => {}
             }
-            if removed {
-                // The slot stays taken until its pairs have ended.
-                self.slots.set_at(slot, At::New);
-            } else {
-                self.activate(slot);
+        }
+        left.sort_unstable();
+        let mut places = left.iter().copied();
+        for &slot in changes {
+            if self.slots.at(slot) == At::New && self.slots.done(slot) & REMOVED == 0 {
+                self.activate(slot, places.next());
             }
         }
+        // The highest first: then what takes the place of one never leaves itself.
+        places.rev().for_each(|at| self.leave_active(at));
     }
 
     /// Returns the update in which a body that is set now counts as set.
@@ -97,14 +112,19 @@ impl Space {
         if self.slots.body(slot).rests_at_once() { self.update.saturating_sub(IDLE) } else { self.update }
     }
 
-    fn activate(&mut self, slot: u32) {
-        self.slots.set_at(slot, At::Active(self.active.len() as u32));
-        let aabb = self.slots.boxes()[slot as usize];
-        self.active.push(slot, aabb, self.slots.body(slot), self.set_in(slot));
+    /// Adds a body to the active ones, at this place if there is one.
+    fn activate(&mut self, slot: u32, place: Option<u32>) {
+        let at = place.unwrap_or(self.active.len() as u32);
+        self.slots.set_at(slot, At::Active(at));
+        let (aabb, body, update) = (self.slots.boxes()[slot as usize], self.slots.body(slot), self.set_in(slot));
+        match place {
+            Some(at) => self.active.replace(at as usize, slot, aabb, body, update),
+            None => self.active.push(slot, aabb, body, update),
+        }
     }
 
-    fn leave_active(&mut self, slot: u32) {
-        let At::Active(at) = self.slots.at(slot) else { return };
+    /// Removes the active body at a place.
+    fn leave_active(&mut self, at: u32) {
         if let Some(moved) = self.active.swap_remove(at as usize) {
             self.slots.set_at(moved, At::Active(at));
         }
@@ -122,7 +142,7 @@ impl Space {
         self.rests = false;
         for slot in 0..self.slots.boxes().len() as u32 {
             if self.slots.at(slot) == At::Resting {
-                self.activate(slot);
+                self.activate(slot, None);
             }
         }
         self.resting.clear();
@@ -141,11 +161,9 @@ impl Space {
         keys.extend(active.pairs().iter().map(|&(a, b)| key(of[a as usize], of[b as usize])));
         resting.update(slots)?;
         if resting.len() > 0 {
-            let boxes = active.boxes();
-            neighbours.each(resting, of, boxes, |at, other| {
+            neighbours.each(resting, slots.boxes(), (of, active.boxes()), |at, other| {
                 let one = of[at];
                 let meet = slots.at(other) == At::Resting
-                    && boxes[at].overlaps(&slots.boxes()[other as usize])
                     && slots.body(one).membership().wants(slots.body(other).membership());
                 if meet {
                     keys.push(key(one, other));
