@@ -270,15 +270,7 @@ impl Space {
     /// [`Error::OutOfMemory`] and [`Error::Unavailable`]. Then no pair has begun or ended, those of active bodies are
     /// missing, and the next update compares with the last one that succeeded.
     pub fn update(&mut self) -> Result<(), Error> {
-        let changes = self.slots.take_changes();
-        let done = self.run(&changes);
-        if done.is_ok() {
-            self.slots.settle(changes);
-        } else {
-            self.slots.give_back(changes);
-            self.pairs.truncate(self.links.len());
-        }
-        done
+        self.run()
     }
 
     /// Returns the pairs of bodies that overlap and may meet, each once, the lower handle first. Touching bodies

@@ -19,21 +19,29 @@ pub(super) enum At {
 }
 
 /// What was done to a body since the last update: one bit each.
-pub(super) const SET: u8 = 1;
+const SET: u8 = 1;
 pub(super) const SET_BODY: u8 = 2;
-const INSERTED: u8 = 4;
-pub(super) const REMOVED: u8 = 8;
+pub(super) const REMOVED: u8 = 4;
 
-/// See the module. Each list but the last two is by slot.
+#[derive(Debug, Clone, Copy)]
+struct Slot {
+    generation: u32,
+    at: At,
+    done: u8,
+    /// [`Body::rests_at_once`].
+    rests_at_once: bool,
+}
+
+/// See the module.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Slots {
-    generations: Vec<u32>,
-    at: Vec<At>,
-    done: Vec<u8>,
+    slots: Vec<Slot>,
     boxes: Vec<Aabb>,
     bodies: Vec<Body>,
     /// Slots without a body.
     free: Vec<u32>,
+    /// Slots of removed bodies whose pairs have not ended yet.
+    leaving: Vec<u32>,
     /// Slots to which something was done since the last update, each once.
     changed: Vec<u32>,
     /// Number of bodies.
@@ -52,9 +60,7 @@ impl Slots {
             return Err(Error::TooManyObjects { objects: most });
         }
         let refused = |_| Error::OutOfMemory { what: "bodies", elements: most };
-        self.generations.try_reserve(room).map_err(refused)?;
-        self.at.try_reserve(room).map_err(refused)?;
-        self.done.try_reserve(room).map_err(refused)?;
+        self.slots.try_reserve(room).map_err(refused)?;
         self.boxes.try_reserve(room).map_err(refused)?;
         self.bodies.try_reserve(room).map_err(refused)?;
         self.changed.try_reserve(more).map_err(refused)
@@ -63,20 +69,14 @@ impl Slots {
     /// Returns the slot of a handle.
     #[inline]
     pub(super) fn find(&self, handle: Handle) -> Result<u32, Error> {
-        let slot = handle.slot();
-        let known = self.generations.get(slot as usize) == Some(&handle.generation()) && self.is_here(slot);
-        if known { Ok(slot) } else { Err(Error::StaleHandle { handle }) }
-    }
-
-    /// Returns whether there is a body in a slot.
-    #[inline]
-    fn is_here(&self, slot: u32) -> bool {
-        self.at(slot) != At::Free && self.done(slot) & REMOVED == 0
+        let known = self.slots.get(handle.slot() as usize);
+        let known = known.is_some_and(|slot| slot.generation == handle.generation() && slot.is_taken());
+        if known { Ok(handle.slot()) } else { Err(Error::StaleHandle { handle }) }
     }
 
     #[inline]
     pub(super) fn handle(&self, slot: u32) -> Handle {
-        Handle::new(slot, self.generations[slot as usize])
+        Handle::new(slot, self.slots[slot as usize].generation)
     }
 
     /// Returns all boxes by slot. Those of free slots are unspecified.
@@ -90,33 +90,34 @@ impl Slots {
 
     #[inline]
     pub(super) fn at(&self, slot: u32) -> At {
-        self.at[slot as usize]
+        self.slots[slot as usize].at
     }
 
     pub(super) fn set_at(&mut self, slot: u32, at: At) {
-        self.at[slot as usize] = at;
+        self.slots[slot as usize].at = at;
     }
 
-    /// Returns what was done to a body since the last update.
-    #[inline]
-    pub(super) fn done(&self, slot: u32) -> u8 {
-        self.done[slot as usize]
+    pub(super) fn is_changed(&self, slot: u32) -> bool {
+        self.slots[slot as usize].done != 0
+    }
+
+    /// Returns [`Body::rests_at_once`].
+    pub(super) fn rests_at_once(&self, slot: u32) -> bool {
+        self.slots[slot as usize].rests_at_once
     }
 
     /// Inserts a body whose box is valid. There must be room.
     pub(super) fn insert(&mut self, aabb: Aabb, body: Body) -> Handle {
         let slot = self.free.pop().unwrap_or_else(|| {
-            self.generations.push(1);
-            self.at.push(At::Free);
-            self.done.push(0);
+            self.slots.push(Slot { generation: 1, at: At::Free, done: 0, rests_at_once: false });
             self.boxes.push(aabb);
             self.bodies.push(body);
             (self.boxes.len() - 1) as u32
         });
-        let at = slot as usize;
-        (self.at[at], self.boxes[at], self.bodies[at]) = (At::New, aabb, body);
+        self.slots[slot as usize].at = At::New;
+        self.boxes[slot as usize] = aabb;
         self.len += 1;
-        self.note(slot, INSERTED);
+        self.set_body(slot, body);
         self.handle(slot)
     }
 
@@ -128,6 +129,7 @@ impl Slots {
 
     pub(super) fn set_body(&mut self, slot: u32, body: Body) {
         self.bodies[slot as usize] = body;
+        self.slots[slot as usize].rests_at_once = body.rests_at_once();
         self.note(slot, SET_BODY);
     }
 
@@ -138,39 +140,58 @@ impl Slots {
 
     #[inline]
     fn note(&mut self, slot: u32, what: u8) {
-        let done = &mut self.done[slot as usize];
+        let done = &mut self.slots[slot as usize].done;
         if *done == 0 {
             self.changed.push(slot);
         }
         *done |= what;
     }
 
-    /// Takes the list of changes, until [`settle`](Self::settle) or [`give_back`](Self::give_back).
+    /// Takes the slots to which something was done. [`take_done`](Self::take_done) of each, then
+    /// [`give_back`](Self::give_back) follow.
     pub(super) fn take_changes(&mut self) -> Vec<u32> {
         std::mem::take(&mut self.changed)
     }
 
-    /// Keeps the changes for the next update.
-    pub(super) fn give_back(&mut self, changes: Vec<u32>) {
+    /// Returns what was done to a body. That a body was removed stays known until [`free`](Self::free).
+    #[inline]
+    pub(super) fn take_done(&mut self, slot: u32) -> u8 {
+        let of = &mut self.slots[slot as usize];
+        let done = of.done;
+        of.done &= REMOVED;
+        if of.done != 0 {
+            self.leaving.push(slot);
+        }
+        done
+    }
+
+    /// Gives the list back, for its memory.
+    pub(super) fn give_back(&mut self, mut changes: Vec<u32>) {
+        changes.clear();
         self.changed = changes;
     }
 
-    /// Forgets the changes, and frees the slots of removed bodies.
-    pub(super) fn settle(&mut self, mut changes: Vec<u32>) {
-        for slot in changes.drain(..) {
-            let at = slot as usize;
-            if std::mem::take(&mut self.done[at]) & REMOVED != 0 {
-                self.at[at] = At::Free;
-                // 0 is no generation.
-                self.generations[at] = self.generations[at].checked_add(1).unwrap_or(1);
-                self.free.push(slot);
-            }
+    /// Frees the slots of removed bodies.
+    pub(super) fn free(&mut self) {
+        for slot in self.leaving.drain(..) {
+            let of = &mut self.slots[slot as usize];
+            // 0 is no generation.
+            *of = Slot { generation: of.generation.checked_add(1).unwrap_or(1), at: At::Free, done: 0, ..*of };
+            self.free.push(slot);
         }
-        self.changed = changes;
     }
 
     /// Returns the handles of all bodies, by slot.
     pub(super) fn handles(&self) -> impl Iterator<Item = Handle> {
-        (0..self.boxes.len() as u32).filter(|&slot| self.is_here(slot)).map(|slot| self.handle(slot))
+        let taken = |(_, of): &(u32, &Slot)| of.is_taken();
+        (0..).zip(&self.slots).filter(taken).map(|(slot, of)| Handle::new(slot, of.generation))
+    }
+}
+
+impl Slot {
+    /// Returns whether there is a body in the slot.
+    #[inline]
+    fn is_taken(&self) -> bool {
+        self.at != At::Free && self.done & REMOVED == 0
     }
 }

@@ -18,15 +18,17 @@ fn slots(key: u64) -> (u32, u32) {
 }
 
 impl Space {
-    /// The update, but for the list of changes.
-    pub(super) fn run(&mut self, changes: &[u32]) -> Result<(), Error> {
+    /// Does an update.
+    pub(super) fn run(&mut self) -> Result<(), Error> {
         self.update += 1;
         self.pairs.truncate(self.links.len());
         self.begun.clear();
         self.ended.clear();
         self.rest();
         let known = self.before.len();
-        self.apply(changes);
+        let changes = self.slots.take_changes();
+        self.apply(&changes);
+        self.slots.give_back(changes);
         if self.rests && self.active.len() * MANY > 2 * self.resting.len() {
             self.wake_all();
         }
@@ -34,13 +36,15 @@ impl Space {
             self.sorter.sort(&Alone, &mut self.before);
         }
         self.find()?;
-        self.compare()
+        self.compare()?;
+        self.slots.free();
+        Ok(())
     }
 
     /// Lets bodies rest that were not set for some updates, if they are many.
     fn rest(&mut self) {
         let Self { active, slots, update, .. } = self;
-        let idle = |at: usize| active.set_in()[at] + IDLE <= *update && slots.done(active.slots()[at]) == 0;
+        let idle = |at: usize| active.set_in()[at] + IDLE <= *update && !slots.is_changed(active.slots()[at]);
         let first = (0..active.len()).find(|&at| idle(at));
         let Some(first) = first else { return };
         if !self.rests {
@@ -73,43 +77,40 @@ impl Space {
     /// Does what the caller has asked for since the previous update.
     fn apply(&mut self, changes: &[u32]) {
         // Newcomers take the places of active bodies that leave, so that few boxes change their position.
-        let mut left = Vec::new();
+        let (mut left, mut newcomers) = (Vec::new(), Vec::new());
         for &slot in changes {
-            let done = self.slots.done(slot);
-            match self.slots.at(slot) {
-                At::Active(at) if done & REMOVED == 0 => {
-                    let update = self.set_in(slot);
-                    self.active.set(at as usize, self.slots.boxes()[slot as usize], update);
+            let done = self.slots.take_done(slot);
+            let removed = done & REMOVED != 0;
+            let at = self.slots.at(slot);
+            match at {
+                At::Active(at) if !removed => {
+                    let set_in = self.set_in(slot);
+                    self.active.set(at as usize, self.slots.boxes()[slot as usize], set_in);
                     if done & SET_BODY != 0 {
                         self.active.set_body(at as usize, self.slots.body(slot));
                     }
+                    continue;
                 }
-                At::Active(at) => {
-                    left.push(at);
-                    // The slot stays taken until its pairs have ended.
-                    self.slots.set_at(slot, At::New);
-                }
-                At::Resting => {
-                    self.leave_resting(slot);
-                    self.slots.set_at(slot, At::New);
-                }
+                At::Active(at) => left.push(at),
+                At::Resting => self.leave_resting(slot),
                 At::New | At::Free => {}
+            }
+            // The slot of a removed body stays taken until its pairs have ended.
+            self.slots.set_at(slot, At::New);
+            if !removed {
+                newcomers.push(slot);
             }
         }
         left.sort_unstable();
         let mut places = left.iter().copied();
-        for &slot in changes {
-            if self.slots.at(slot) == At::New && self.slots.done(slot) & REMOVED == 0 {
-                self.activate(slot, places.next());
-            }
-        }
+        newcomers.into_iter().for_each(|slot| self.activate(slot, places.next()));
         // The highest first: then what takes the place of one never leaves itself.
         places.rev().for_each(|at| self.leave_active(at));
     }
 
     /// Returns the update in which a body that is set now counts as set.
     fn set_in(&self, slot: u32) -> u64 {
-        if self.slots.body(slot).rests_at_once() { self.update.saturating_sub(IDLE) } else { self.update }
+        if self.slots.rests_at_once(slot) { self.update.saturating_sub(IDLE) } else { self.update }
     }
 
     /// Adds a body to the active ones, at this place if there is one.
