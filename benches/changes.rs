@@ -47,7 +47,7 @@ fn changes(c: &mut Criterion) {
         });
         // Half of the pairs pass.
         let membership =
-            |k: usize| Membership { groups: 1 << (k % 2), mask: 1 << (k / 2 % 2) | 1 << (k % 2), fixed: false };
+            |k: usize| Membership { groups: 1 << (k % 2), mask: 1 << (k / 2 % 2) | 1 << (k % 2), ..Membership::ALL };
         let filter = Filter::new((0..objects).map(|k| k.wrapping_mul(0x9e37_79b9) >> 7).map(membership).collect());
         for (name, filter) in [("find", None), ("find, filtered", Some(filter))] {
             let (mut algorithm, mut pairs, mut frames) = (strips(), Pairs::new(), walk(&boxes));

@@ -1,6 +1,10 @@
 //! The filter on overlapping pairs.
 
+mod screen;
+
 use crate::pair::Pair;
+
+pub(crate) use screen::Screen;
 
 /// The groups and the mask of a box, as in most physics engines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -12,18 +16,32 @@ pub struct Membership {
     pub mask: u32,
     /// Whether the box never moves. Two fixed boxes are no pair.
     pub fixed: bool,
+    /// What the box is a part of, such as a body or a ragdoll. Two boxes with the same owner are no pair. 0: nothing.
+    pub owner: u32,
 }
 
 impl Membership {
     /// In every group, and collides with every group: the default.
-    pub const ALL: Self = Self { groups: u32::MAX, mask: u32::MAX, fixed: false };
+    pub const ALL: Self = Self { groups: u32::MAX, mask: u32::MAX, fixed: false, owner: 0 };
 
     /// Returns whether two boxes with these memberships are wanted as a pair.
     #[inline]
     #[must_use]
     pub fn wants(&self, other: &Self) -> bool {
         // Without branches: with many groups no CPU could predict them.
-        (self.groups & other.mask != 0) & (other.groups & self.mask != 0) & !(self.fixed & other.fixed)
+        (self.groups & other.mask != 0)
+            & (other.groups & self.mask != 0)
+            & !(self.fixed & other.fixed)
+            & ((self.owner != other.owner) | (self.owner == 0))
+    }
+
+    /// Returns whether a box with this membership is wanted by no box that does not want one with `other`.
+    #[inline]
+    pub(crate) fn is_within(&self, other: &Self) -> bool {
+        (self.groups & !other.groups == 0)
+            & (self.mask & !other.mask == 0)
+            & (self.fixed | !other.fixed)
+            & ((self.owner == other.owner) | (other.owner == 0))
     }
 }
 
@@ -51,39 +69,29 @@ impl Filter {
         Self { memberships }
     }
 
+    /// Returns the membership of a box.
+    #[inline]
+    pub(crate) fn of(&self, id: u32) -> &Membership {
+        self.memberships.get(id as usize).unwrap_or(&Membership::ALL)
+    }
+
     /// Returns whether the boxes at these two positions are wanted as a pair.
     #[inline]
     #[must_use]
     pub fn wants(&self, (a, b): Pair) -> bool {
-        let of = |id: u32| self.memberships.get(id as usize).unwrap_or(&Membership::ALL);
-        of(a).wants(of(b))
+        self.of(a).wants(self.of(b))
     }
 
-    /// Returns whether the box at this position never moves.
-    #[inline]
-    pub(crate) fn is_fixed(&self, id: usize) -> bool {
-        self.memberships.get(id).is_some_and(|m| m.fixed)
-    }
-
-    /// Moves the wanted ones of `pairs` to its head, in their order. Returns their number, and the number of the others
-    /// that have a member which may move.
-    pub(crate) fn keep_wanted(&self, pairs: &mut [Pair]) -> (usize, usize) {
-        let (mut kept, mut unwanted) = (0, 0);
+    /// Moves the wanted ones of `pairs` to its head, in their order. Returns their number.
+    pub(crate) fn keep_wanted(&self, pairs: &mut [Pair]) -> usize {
+        let mut kept = 0;
         for at in 0..pairs.len() {
             // Moved in any case and kept if wanted: no branch.
             let pair = pairs[at];
             pairs[kept] = pair;
-            let wanted = self.wants(pair);
-            kept += usize::from(wanted);
-            unwanted += usize::from(!wanted & !self.both_fixed(pair));
+            kept += usize::from(self.wants(pair));
         }
-        (kept, unwanted)
-    }
-
-    /// Returns whether both boxes are fixed.
-    #[inline]
-    pub(crate) fn both_fixed(&self, (a, b): Pair) -> bool {
-        self.is_fixed(a as usize) & self.is_fixed(b as usize)
+        kept
     }
 }
 
@@ -92,8 +100,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn both_masks_must_allow_and_one_box_must_move() {
-        let of = |groups, mask, fixed| Membership { groups, mask, fixed };
+    fn masks_motion_and_owners_decide() {
+        let of = |groups, mask, fixed| Membership { groups, mask, fixed, owner: 0 };
+        let part = |owner| Membership { owner, ..Membership::ALL };
         let (player, bullet, wall) = (of(0b001, 0b111, false), of(0b010, 0b101, false), of(0b100, 0b111, true));
         for (a, b, wanted) in [
             (player, player, true),
@@ -105,6 +114,9 @@ mod tests {
             (Membership::ALL, of(0, u32::MAX, false), false),
             (Membership::ALL, of(u32::MAX, 0, false), false),
             (Membership::ALL, of(1 << 31, 1 << 31, true), true),
+            (part(7), part(7), false),
+            (part(7), part(8), true),
+            (part(u32::MAX), part(0), true),
         ] {
             assert_eq!((a.wants(&b), b.wants(&a)), (wanted, wanted), "{a:?} and {b:?}");
         }
@@ -113,7 +125,7 @@ mod tests {
     #[test]
     fn box_beyond_the_end_is_in_every_group() {
         let filter = Filter::new(vec![
-            Membership { groups: 1, mask: 2, fixed: false },
+            Membership { groups: 1, mask: 2, ..Membership::ALL },
             Membership { mask: 0, ..Membership::ALL },
         ]);
         assert!(filter.wants((0, 2)) && filter.wants((2, 7)) && filter.wants((u32::MAX - 1, u32::MAX)));

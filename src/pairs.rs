@@ -4,7 +4,7 @@ mod fill;
 mod order;
 
 use crate::error::Error;
-use crate::filter::Filter;
+use crate::filter::{Filter, Screen};
 use crate::pair::Pair;
 use crate::splitmix::mix;
 use std::sync::Arc;
@@ -39,10 +39,10 @@ pub struct Pairs {
     over: bool,
     /// If this list is a part of a frame: whether any of the parts is over.
     any_over: Option<Arc<AtomicBool>>,
-    /// Pairs that the filter dropped, without those of two fixed boxes, which most algorithms never look for.
+    /// Pairs that were found and dropped by the filter.
     unwanted: u64,
     /// Shared with the lists of tasks while they work.
-    filter: Option<Arc<Filter>>,
+    filter: Option<Arc<Screen>>,
     order: PairOrder,
     limit: Option<usize>,
     /// Elements of the refused allocation, if one was refused.
@@ -81,18 +81,23 @@ impl Pairs {
 
     /// Sets the filter that pairs must pass from the next frame on, or lifts it.
     pub fn set_filter(&mut self, filter: Option<Filter>) {
-        self.filter = filter.map(Arc::new);
+        self.filter = filter.map(|filter| Arc::new(Screen::new(filter)));
     }
 
     /// Returns the filter set by [`set_filter`](Self::set_filter).
     #[must_use]
     pub fn filter(&self) -> Option<&Filter> {
-        self.filter.as_deref()
+        self.filter.as_deref().map(|screen| &screen.filter)
     }
 
     /// Returns the filter for changes between frames: in place, without a copy unless this list was cloned.
     pub fn filter_mut(&mut self) -> Option<&mut Filter> {
-        self.filter.as_mut().map(Arc::make_mut)
+        self.filter.as_mut().map(|screen| Arc::make_mut(screen).filter_mut())
+    }
+
+    /// Returns the filter and what methods derive from it.
+    pub(crate) fn screen(&self) -> Option<&Screen> {
+        self.filter.as_deref()
     }
 
     /// Returns the order that the caller wants.
@@ -124,8 +129,11 @@ impl Pairs {
         self.as_slice().iter()
     }
 
-    /// Returns the number of overlapping pairs in the last frame. It includes those that the filter dropped, but for
-    /// pairs of two fixed boxes.
+    /// Returns the number of pairs that the search of the last frame found: the wanted ones, and those that only the
+    /// filter dropped.
+    ///
+    /// Without a filter this is [`len`](Self::len). With one it depends on the algorithm: `brute`, `sap`, `grid-sap`
+    /// and GPUs find unwanted pairs that `bvh` and `pair-cache` rule out earlier.
     #[must_use]
     pub fn overlapping(&self) -> u64 {
         self.len as u64 + self.unwanted
@@ -143,13 +151,16 @@ impl Pairs {
         self.over = false;
         self.unwanted = 0;
         self.refused = None;
+        if let Some(screen) = self.filter.as_mut().filter(|screen| screen.is_stale()) {
+            Arc::make_mut(screen).derive();
+        }
     }
 
     /// Adds one pair, in either order of its members, if the filter wants it. A pair beyond the limit is not stored.
     #[inline]
     pub fn push(&mut self, a: u32, b: u32) {
-        if let Some(filter) = self.filter.as_ref().filter(|filter| !filter.wants((a, b))) {
-            self.unwanted += u64::from(!filter.both_fixed((a, b)));
+        if self.filter.as_ref().is_some_and(|screen| !screen.filter.wants((a, b))) {
+            self.unwanted += 1;
             return;
         }
         if self.is_full() || self.len == self.buffer.len() && !self.grow(1) {

@@ -62,7 +62,12 @@ fn allocations(
     extras: bool,
 ) -> (usize, usize) {
     let mut pairs = Pairs::with_order(if extras { PairOrder::Canonical } else { PairOrder::Any });
-    let membership = |k: usize| Membership { groups: 1 << (k % 5), mask: !(1 << (k % 7)), fixed: k.is_multiple_of(11) };
+    let membership = |k: usize| Membership {
+        groups: 1 << (k % 5),
+        mask: !(1 << (k % 7)),
+        fixed: k.is_multiple_of(11),
+        owner: (k % 3) as u32,
+    };
     let mut changes = Changes::new();
     let (mut counted, mut large) = (0, 0);
     for round in 0..=rounds {

@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 pub struct Answer {
     /// The wanted pairs in canonical order, or the error.
     pub pairs: Result<Vec<Pair>, Error>,
-    /// Number of overlapping pairs, but for those of two fixed boxes.
+    /// Number of overlapping pairs, wanted or not.
     pub overlapping: u64,
 }
 
@@ -21,7 +21,7 @@ pub fn answer(boxes: &[Aabb], memberships: Option<&[Membership]>, limit: Option<
         return Answer { pairs: Err(Error::InvalidBox { index, defect }), overlapping: 0 };
     }
     let of = |k: usize| {
-        memberships.and_then(|m| m.get(k)).copied().unwrap_or(Membership { groups: !0, mask: !0, fixed: false })
+        memberships.and_then(|m| m.get(k)).copied().unwrap_or(Membership { groups: !0, mask: !0, fixed: false, owner: 0 })
     };
     let mut pairs = Vec::new();
     let mut overlapping = 0;
@@ -31,8 +31,9 @@ pub fn answer(boxes: &[Aabb], memberships: Option<&[Membership]>, limit: Option<
                 continue;
             }
             let (a, b) = (of(i), of(j));
-            overlapping += u64::from(!(a.fixed && b.fixed));
-            if a.groups & b.mask != 0 && b.groups & a.mask != 0 && !(a.fixed && b.fixed) {
+            overlapping += 1;
+            let apart = a.owner == 0 || a.owner != b.owner;
+            if a.groups & b.mask != 0 && b.groups & a.mask != 0 && !(a.fixed && b.fixed) && apart {
                 pairs.push((i as u32, j as u32));
             }
         }

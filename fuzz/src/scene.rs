@@ -197,9 +197,10 @@ impl Scene {
     }
 }
 
-/// Returns one or two of four groups, and a mask without one or two. One box in four is fixed.
+/// Returns one or two of four groups, and a mask without one or two. One box in four is fixed, and three in
+/// four have one of three owners.
 fn membership(random: &mut Random) -> Membership {
     let mut groups = || 1 << random.below(4) | 1 << random.below(4);
     let (groups, mask) = (groups(), !groups());
-    Membership { groups, mask, fixed: random.below(4) == 0 }
+    Membership { groups, mask, fixed: random.below(4) == 0, owner: random.below(4) as u32 }
 }

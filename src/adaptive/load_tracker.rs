@@ -111,8 +111,8 @@ impl LoadTracker {
         self.before.is_none() || rested && self.passed_ns * (SHARE + SHARE_OF_DRIFT * drift) >= self.sample_ns
     }
 
-    /// Takes note of a frame that ran without a decision, the last of those that have `passed`, and of its
-    /// overlapping pairs, those that a filter kept out included.
+    /// Takes note of a frame that ran without a decision, the last of those that have `passed`, and of its wanted pairs:
+    /// every algorithm has the same number of them. Unwanted ones that some algorithms find count as their slowness.
     pub(super) fn passes(&mut self, boxes: &[Aabb], pairs: u64, passed: &Passed) {
         self.throttle.ran(count(boxes), pairs);
         // A look alone takes a tenth of a decision, and most looks find the pace of before.
@@ -138,8 +138,8 @@ impl LoadTracker {
         self.motion.passed(ns);
     }
 
-    /// Takes in a frame that was decided on, or stood out among those that were not: its overlapping pairs, those
-    /// that a filter kept out included, and how long it took in nanoseconds.
+    /// Takes in a frame that was decided on, or stood out among those that were not: its wanted pairs, and how long it
+    /// took in nanoseconds.
     pub(super) fn ran(&mut self, boxes: &[Aabb], pairs: u64, ns: f64) {
         // One that was not decided on: the next one would be compared with the one before it.
         self.look(boxes);

@@ -266,7 +266,7 @@ impl Runner {
                 match ns.filter(|&ns| !self.passed.is_usual(ns)) {
                     None => {
                         self.passed.add(work, ns);
-                        self.tracker.passes(boxes, pairs.overlapping(), &self.passed);
+                        self.tracker.passes(boxes, pairs.len() as u64, &self.passed);
                     }
                     Some(ns) => {
                         self.catch_up();
@@ -334,7 +334,7 @@ impl Runner {
     fn learn(&mut self, decided: Decided, ns: f64, boxes: &[Aabb], pairs: &Pairs) {
         let Some(choice) = self.choice else { return };
         let stood_out = matches!(decided, Decided::Never);
-        self.tracker.ran(boxes, pairs.overlapping(), ns);
+        self.tracker.ran(boxes, pairs.len() as u64, ns);
         let dear = self.policy.ran(choice.chosen, ns, self.work);
         let decision_ns = match decided {
             Decided::At(started) => Some(self.tracker.without_sample(started.elapsed().as_nanos() as f64 - ns)),

@@ -8,7 +8,7 @@ use crate::cpu::kernel::brute_rows;
 use crate::cpu::level::Simd;
 use crate::cpu::workers::{Outputs, Workers};
 use crate::error::Error;
-use crate::filter::Filter;
+use crate::filter::Screen;
 use crate::pairs::Pairs;
 
 /// Pairs that are tested in the time that `grid-sap` takes for a box, in round numbers.
@@ -18,7 +18,7 @@ const PAIRS_PER_BOX: usize = 512;
 #[derive(Debug)]
 struct Brute {
     workers: Workers,
-    /// Positions in the input: boxes that may move, then fixed ones.
+    /// Positions in the input: active boxes, then passive ones.
     order: Vec<u32>,
     columns: Columns,
     outputs: Outputs,
@@ -40,17 +40,17 @@ impl BroadPhase for Brute {
         let workers = &workers.fit(boxes.len().saturating_mul(boxes.len()) / (2 * PAIRS_PER_BOX));
         let _frame = workers.frame();
         workers.check(boxes)?;
-        let moving = moving_first(order, pairs.filter(), boxes.len())?;
+        let active = active_first(order, pairs.screen(), boxes.len())?;
         workers.fill(columns.as_mut(), |first, mut part| {
             for at in 0..part.len() {
-                let id = if moving.is_some() { order[first + at] } else { (first + at) as u32 };
+                let id = if active.is_some() { order[first + at] } else { (first + at) as u32 };
                 part.set(at, &boxes[id as usize], 0, id);
             }
         });
-        // A fixed box is compared only with those before it that may move.
-        let moving = moving.unwrap_or(boxes.len());
+        // A passive box is compared only with the active ones before it.
+        let active = active.unwrap_or(boxes.len());
         outputs.find(workers, pairs, |k, parts, list| {
-            let row = |k: usize| row(moving, boxes.len(), k, parts);
+            let row = |k: usize| row(active, boxes.len(), k, parts);
             brute_rows(*simd, columns, row(k)..row(k + 1), list);
         });
         pairs.finish_on(workers)
@@ -62,22 +62,22 @@ impl BroadPhase for Brute {
     }
 }
 
-/// Writes the positions of `count` boxes to `order`: first those that may move, then the fixed ones. Returns how many
-/// may move, or `None`, and leaves `order` alone, if all may.
-fn moving_first(order: &mut Vec<u32>, filter: Option<&Filter>, count: usize) -> Result<Option<usize>, Error> {
-    let is_fixed = |id: usize| filter.is_some_and(|f| f.is_fixed(id));
-    let fixed = filter.map_or(0, |_| (0..count).filter(|&id| is_fixed(id)).count());
-    if fixed == 0 {
+/// Writes the positions of `count` boxes to `order`: first the active ones, then the [passive](Screen) ones. Returns the
+/// number of active ones, or `None`, and leaves `order` alone, if all are.
+fn active_first(order: &mut Vec<u32>, screen: Option<&Screen>, count: usize) -> Result<Option<usize>, Error> {
+    let is_passive = |id: usize| screen.is_some_and(|s| s.is_passive(id));
+    let passive = screen.map_or(0, |_| (0..count).filter(|&id| is_passive(id)).count());
+    if passive == 0 {
         return Ok(None);
     }
     ensure(order, count, "positions of boxes")?;
-    let mut next = [0, count - fixed];
+    let mut next = [0, count - passive];
     for id in 0..count {
-        let next = &mut next[usize::from(is_fixed(id))];
+        let next = &mut next[usize::from(is_passive(id))];
         order[*next] = id as u32;
         *next += 1;
     }
-    Ok(Some(count - fixed))
+    Ok(Some(count - passive))
 }
 
 /// Returns the first row of part `k` when the first `rows` rows of the triangle of the pairs of `boxes` are cut into

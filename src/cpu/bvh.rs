@@ -44,7 +44,7 @@ impl BroadPhase for Bvh {
         let Self { workers, tree, upkeep, outputs } = self;
         let workers = &workers.fit(boxes.len());
         let _frame = workers.frame();
-        upkeep.update(tree, workers, boxes, || plan.stats(boxes), pairs.filter())?;
+        upkeep.update(tree, workers, boxes, || plan.stats(boxes), pairs.screen())?;
         let started = Instant::now();
         outputs.find(workers, pairs, |k, parts, list| tree.self_pairs(k, parts, list));
         upkeep.searched(started, boxes.len());

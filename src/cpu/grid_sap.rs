@@ -14,8 +14,8 @@
 //! has several tasks a thread: for each strip, a task gathers the bins of all threads, sorts them along the sweep axis
 //! and sweeps.
 //!
-//! Oversized boxes, the boxes of overfull strips and fixed boxes go into a separate [tree](super::tree). Its boxes are
-//! compared with each other, but for two fixed ones, and with the boxes of every strip.
+//! Oversized boxes, the boxes of overfull strips and [passive](Screen) boxes go into a separate [tree](super::tree). Its
+//! boxes are compared with each other, but for two passive ones, and with the boxes of every strip.
 
 use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, check_count};
@@ -27,7 +27,7 @@ use crate::cpu::level::Simd;
 use crate::cpu::tree::{Members, Tree};
 use crate::cpu::workers::{Outputs, Workers};
 use crate::error::Error;
-use crate::filter::Filter;
+use crate::filter::Screen;
 use crate::load::{FramePlan, SceneStats, StripGrid, StripSpan};
 use crate::pairs::Pairs;
 use std::ops::Range;
@@ -114,13 +114,13 @@ impl BroadPhase for GridSap {
         pairs.clear();
         check_count(boxes.len())?;
         let Self { workers, bins, apart, tree, tasks, outputs, simd } = self;
-        let (grid, filter) = (plan.grid(boxes), pairs.filter());
+        let (grid, screen) = (plan.grid(boxes), pairs.screen());
         let workers = &workers.fit(boxes.len());
         let _frame = workers.frame();
         let threads = workers.threads();
         let (bins, tasks) = (&mut bins[..threads], &mut tasks[..workers.tasks()]);
         workers.each(bins, |k, bin| {
-            bin.error = bin.fill(&grid, boxes, part(boxes.len(), k, threads), threads, filter).err();
+            bin.error = bin.fill(&grid, boxes, part(boxes.len(), k, threads), threads, screen).err();
         });
         bins.iter_mut().find_map(|b| b.error.take()).map_or(Ok(()), Err)?;
         apart.clear();
@@ -130,7 +130,7 @@ impl BroadPhase for GridSap {
         let tree = if apart.is_empty() {
             None
         } else {
-            tree.build(workers, boxes, Members::Of(apart), &SceneStats::of_members(boxes, apart), filter)?;
+            tree.build(workers, boxes, Members::Of(apart), &SceneStats::of_members(boxes, apart), screen)?;
             Some(&*tree)
         };
         let (bins, strips, count) = (&*bins, grid.strips(), tasks.len());
@@ -180,7 +180,7 @@ impl Bins {
         boxes: &[Aabb],
         share: Range<usize>,
         threads: usize,
-        filter: Option<&Filter>,
+        screen: Option<&Screen>,
     ) -> Result<(), Error> {
         let first = share.start;
         let share = &boxes[share];
@@ -189,9 +189,9 @@ impl Bins {
         ensure(&mut self.spans, share.len(), "boxes in strips")?;
         // The axes are constants in each of the three calls, so that no index is computed.
         match grid.axis {
-            0 => self.count::<0>(grid, share, first, filter)?,
-            1 => self.count::<1>(grid, share, first, filter)?,
-            _ => self.count::<2>(grid, share, first, filter)?,
+            0 => self.count::<0>(grid, share, first, screen)?,
+            1 => self.count::<1>(grid, share, first, screen)?,
+            _ => self.count::<2>(grid, share, first, screen)?,
         }
         let most = (MOST_BOXES / threads).max(MOST_OF_SHARE) as u32;
         if self.apart_count > 0 || self.starts[..strips].iter().any(|&count| count > most) {
@@ -230,7 +230,7 @@ impl Bins {
         grid: &StripGrid,
         share: &[Aabb],
         first: usize,
-        filter: Option<&Filter>,
+        screen: Option<&Screen>,
     ) -> Result<(), Error> {
         let starts = &mut self.starts[..=grid.strips()];
         starts.fill(0);
@@ -239,8 +239,8 @@ impl Bins {
             if let Some(defect) = b.defect() {
                 return Err(Error::InvalidBox { index: k, defect });
             }
-            let fixed = filter.is_some_and(|f| f.is_fixed(k));
-            *span = if fixed { StripSpan::APART } else { grid.span::<AXIS>(b) };
+            let passive = screen.is_some_and(|s| s.is_passive(k));
+            *span = if passive { StripSpan::APART } else { grid.span::<AXIS>(b) };
             self.apart_count += usize::from(*span == StripSpan::APART);
             grid.each_strip(*span, |strip, _| starts[strip] += 1);
         }

@@ -5,6 +5,7 @@
 
 pub(crate) mod bounds;
 pub(crate) mod contain;
+pub(crate) mod marks;
 pub(crate) mod node;
 #[cfg(any(test, not(target_arch = "x86_64")))]
 mod portable;

@@ -134,7 +134,7 @@ impl BroadPhase for PairCache {
             let Self { workers, tree, upkeep, outputs, .. } = self;
             // Without the time that keeping took in vain.
             let started = Instant::now();
-            upkeep.update(tree.of_boxes(), workers, boxes, || plan.stats(boxes), pairs.filter())?;
+            upkeep.update(tree.of_boxes(), workers, boxes, || plan.stats(boxes), pairs.screen())?;
             let searching = Instant::now();
             outputs.find(workers, pairs, |k, parts, list| tree.self_pairs(k, parts, list));
             upkeep.searched(searching, boxes.len());
@@ -245,7 +245,7 @@ impl PairCache {
         if rebuilt {
             grown.grow_all(workers, boxes, motion.renew(plan, boxes, &changes), shares);
             let stats = SceneStats::of(grown.as_slice());
-            tree.build(workers, grown.as_slice(), Members::From(0), &stats, pairs.filter())?;
+            tree.build(workers, grown.as_slice(), Members::From(0), &stats, pairs.screen())?;
             let most = most_of_list(motion.most_kept(boxes.len()), workers.tasks());
             for list in kept.iter_mut() {
                 list.clear();
@@ -258,9 +258,9 @@ impl PairCache {
         } else {
             changes.gone.clone().for_each(|id| tree.remove(id as u32));
             let far = shares.iter().flat_map(|s| s.far.iter().copied());
-            tree.insert(grown.as_slice(), far, changes.new.start)?;
+            tree.insert(grown.as_slice(), far, changes.new.start, pairs.screen())?;
             let wanted = motion.wants_renewal(boxes.len()) || tree.is_sparse(boxes.len());
-            if tree.renew(workers, grown.as_slice(), pairs.filter(), wanted)? {
+            if tree.renew(workers, grown.as_slice(), pairs.screen(), wanted)? {
                 motion.renewed();
             }
             tree.refit(workers, grown.as_slice(), shares.iter().map(|s| &s.left[..]))?;

@@ -14,13 +14,14 @@ mod upkeep;
 use crate::aabb::Aabb;
 use crate::cpu::columns::part;
 use crate::cpu::kernel::bounds::Bounds;
+use crate::cpu::kernel::marks::Marks;
 use crate::cpu::kernel::node::{Group, LANES, Node};
 use crate::cpu::kernel::prefetch;
 use crate::cpu::kernel::walk::Walk;
 use crate::cpu::level::Simd;
 use crate::cpu::workers::Workers;
 use crate::error::Error;
-use crate::filter::Filter;
+use crate::filter::{Membership, Screen};
 use crate::load::SceneStats;
 use crate::pairs::Pairs;
 use curve::Curve;
@@ -59,8 +60,10 @@ pub(crate) struct Tree {
     /// The leaves, then nodes with the bounds of the leaves, and so on. There are at least two levels. The last level
     /// that is not empty had at most 16 nodes when the tree was built.
     levels: Vec<Vec<Node>>,
-    /// Leaves with boxes that may move. The leaves behind them hold fixed boxes.
-    moving: usize,
+    /// The memberships of all nodes if the filter is [partial](Screen::is_partial), otherwise empty.
+    marks: Vec<Vec<Marks>>,
+    /// Leaves with active boxes. The leaves behind them hold [passive](Screen) boxes.
+    active: usize,
     sweeps: Sweeps,
     order: Order,
     /// The curve of the present order.
@@ -78,8 +81,8 @@ struct Renewal {
     curve: Curve,
     boxes: usize,
     step: usize,
-    /// Boxes that may move, once all are sorted.
-    moving: usize,
+    /// Active boxes, once all are sorted.
+    active: usize,
 }
 
 /// The boxes of a frame that are in a tree.
@@ -106,7 +109,8 @@ impl Tree {
             ids: Vec::new(),
             places: 0,
             levels: Vec::new(),
-            moving: 0,
+            marks: Vec::new(),
+            active: 0,
             sweeps: Sweeps::default(),
             order: Order::default(),
             curve: None,
@@ -121,8 +125,7 @@ impl Tree {
         self.order.reserve(objects)
     }
 
-    /// Builds the tree of the members of `boxes`, of which `stats` are the statistics. Boxes that `filter` calls fixed
-    /// come last.
+    /// Builds the tree of the members of `boxes`, of which `stats` are the statistics. Passive boxes come last.
     ///
     /// # Errors
     /// [`Error::InvalidBox`] for the first invalid member, and [`Error::OutOfMemory`].
@@ -132,11 +135,11 @@ impl Tree {
         boxes: &[Aabb],
         members: Members<'_>,
         stats: &SceneStats,
-        filter: Option<&Filter>,
+        screen: Option<&Screen>,
     ) -> Result<(), Error> {
         let curve = Curve::over(stats, members.len(boxes));
-        let split = self.order.sort(workers, boxes, members, &curve, filter)?;
-        self.arrange(workers, boxes, curve, split)?;
+        let split = self.order.sort(workers, boxes, members, &curve, screen)?;
+        self.arrange(workers, boxes, curve, split, screen)?;
         self.sweep(workers, boxes);
         Ok(())
     }
@@ -148,20 +151,20 @@ impl Tree {
         workers: &Workers,
         boxes: &[Aabb],
         stats: impl FnOnce() -> SceneStats,
-        filter: Option<&Filter>,
+        screen: Option<&Screen>,
     ) -> Result<bool, Error> {
         let (len, all) = (boxes.len(), Members::From(0));
-        let begin = || Renewal { curve: Curve::over(&stats(), len), boxes: len, step: 0, moving: 0 };
+        let begin = || Renewal { curve: Curve::over(&stats(), len), boxes: len, step: 0, active: 0 };
         let mut renewal = self.renewal.take().filter(|renewal| renewal.boxes == len).unwrap_or_else(begin);
         match renewal.step {
             step @ 0..RENEWAL_PARTS => {
                 if step == 0 {
                     self.order.begin(len)?;
                 }
-                self.order.code(workers, boxes, all, part(len, step, RENEWAL_PARTS), &renewal.curve, filter)?;
+                self.order.code(workers, boxes, all, part(len, step, RENEWAL_PARTS), &renewal.curve, screen)?;
             }
-            RENEWAL_PARTS => renewal.moving = self.order.finish(workers, boxes)?,
-            _ => return self.arrange(workers, boxes, renewal.curve, renewal.moving).map(|()| true),
+            RENEWAL_PARTS => renewal.active = self.order.finish(workers, boxes)?,
+            _ => return self.arrange(workers, boxes, renewal.curve, renewal.active, screen).map(|()| true),
         }
         renewal.step += 1;
         self.renewal = Some(renewal);
@@ -173,49 +176,64 @@ impl Tree {
         self.renewal.is_some()
     }
 
-    /// Puts the sorted boxes into leaves. The first `split` of them may move.
-    fn arrange(&mut self, workers: &Workers, boxes: &[Aabb], curve: Curve, split: usize) -> Result<(), Error> {
-        let Self { ids, places: in_use, levels, moving, sweeps, order, .. } = self;
+    /// Puts the sorted boxes into leaves. The first `split` of them are active.
+    fn arrange(
+        &mut self,
+        workers: &Workers,
+        boxes: &[Aabb],
+        curve: Curve,
+        split: usize,
+        screen: Option<&Screen>,
+    ) -> Result<(), Error> {
+        let Self { ids, places: in_use, levels, active, sweeps, order, .. } = self;
         let sorted = order.ids();
-        // The fixed boxes begin a new leaf.
-        *moving = split.div_ceil(LANES);
-        let fixed_from = if split == sorted.len() { split } else { *moving * LANES };
-        *in_use = fixed_from + sorted.len() - split;
+        // The passive boxes begin a new leaf.
+        *active = split.div_ceil(LANES);
+        let passive_from = if split == sorted.len() { split } else { *active * LANES };
+        *in_use = passive_from + sorted.len() - split;
         lay_out(levels, ids, *in_use)?;
         let places = &mut ids[..*in_use];
-        places[split..fixed_from].fill(NOBODY);
-        let fixed = places.len().min(fixed_from);
-        let (before, behind) = places.split_at_mut(fixed);
+        places[split..passive_from].fill(NOBODY);
+        let passive = places.len().min(passive_from);
+        let (before, behind) = places.split_at_mut(passive);
         workers.map(&sorted[..split], &mut before[..split], |_, &key| key as u32);
         workers.map(&sorted[split..], behind, |_, &key| key as u32);
         ids[*in_use..].fill(NOBODY);
         sweeps.begin(order.shapes().iter().map(|(long, at)| {
-            let by = if at.start < split { 0 } else { fixed_from - split };
+            let by = if at.start < split { 0 } else { passive_from - split };
             Kind { long: *long, leaves: (at.start + by).div_ceil(LANES)..(at.end + by) / LANES }
         }));
         self.fill(workers, boxes, |_, _| true);
         (self.curve, self.renewal) = (Some(curve), None);
-        Ok(())
+        self.mark(workers, screen)
     }
 
     /// Chooses the pairs that are not found by walking through the tree.
     fn sweep(&mut self, workers: &Workers, boxes: &[Aabb]) {
-        let Self { ids, levels, moving, sweeps, order, simd, .. } = self;
-        let tree = Walk { levels, ids, far: false, apart: &[] };
+        let Self { ids, levels, active, sweeps, order, simd, .. } = self;
+        let tree = Walk { levels, ids, far: false, apart: &[], marks: None };
         // Without memory for a sweep, the tree finds its pairs.
-        let _ = sweeps.choose(&tree, *moving, *simd, order, workers, boxes);
+        let _ = sweeps.choose(&tree, *active, *simd, order, workers, boxes);
     }
 
     /// Makes room for the boxes from position `before` on, which are new, in leaves behind all others. Boxes beyond the
     /// last one are taken out by [`refit`](Self::refit). Returns `false` if the tree has to be built instead.
-    fn resize(&mut self, workers: &Workers, boxes: &[Aabb], before: usize, stats: impl FnOnce() -> SceneStats) -> bool {
-        let Self { ids, places, levels, moving, order, .. } = self;
+    fn resize(
+        &mut self,
+        workers: &Workers,
+        boxes: &[Aabb],
+        before: usize,
+        stats: impl FnOnce() -> SceneStats,
+        screen: Option<&Screen>,
+    ) -> bool {
+        let Self { ids, places, levels, active, order, .. } = self;
         if boxes.len() <= before {
             return true;
         }
-        // Behind fixed boxes stand no others, because pairs are only looked for from the leaves before them.
-        let all_move = places.div_ceil(LANES) <= *moving;
-        if !all_move || boxes.len() - before > before / 4 {
+        // Behind passive boxes stand no others, because pairs are only looked for from the leaves before them.
+        let all_active = places.div_ceil(LANES) <= *active;
+        let all_passive = || screen.is_some_and(|s| (before..boxes.len()).all(|id| s.is_passive(id)));
+        if boxes.len() - before > before / 4 || !all_active && !all_passive() {
             return false;
         }
         let curve = Curve::over(&stats(), boxes.len() - before);
@@ -225,7 +243,9 @@ impl Tree {
         }
         let first = ids.len();
         *places = first + boxes.len() - before;
-        *moving = places.div_ceil(LANES);
+        if all_active {
+            *active = places.div_ceil(LANES);
+        }
         if lay_out(levels, ids, *places).is_err() {
             return false;
         }
@@ -235,18 +255,20 @@ impl Tree {
     }
 
     /// Gives each box of the tree its present bounds, and takes out those beyond the last one. Returns `false` if a box
-    /// is invalid, or has become fixed or ceased to be; then the tree is of no use.
-    fn refit(&mut self, workers: &Workers, boxes: &[Aabb], filter: Option<&Filter>) -> bool {
-        let fixed_from = self.moving * LANES;
-        let right = if filter.is_none() && self.places <= fixed_from {
+    /// is invalid, or has become passive or ceased to be; then the tree is of no use.
+    fn refit(&mut self, workers: &Workers, boxes: &[Aabb], screen: Option<&Screen>) -> bool {
+        let passive_from = self.active * LANES;
+        let right = if screen.is_none() && self.places <= passive_from {
             self.fill(workers, boxes, |_, _| true)
         } else {
-            self.fill(workers, boxes, |place, id| filter.is_some_and(|f| f.is_fixed(id)) == (place >= fixed_from))
+            self.fill(workers, boxes, |place, id| screen.is_some_and(|s| s.is_passive(id)) == (place >= passive_from))
         };
-        if right {
-            self.sweep(workers, boxes);
+        // A build reports an error.
+        if !right || self.mark(workers, screen).is_err() {
+            return false;
         }
-        right
+        self.sweep(workers, boxes);
+        true
     }
 
     /// Writes the bounds of all boxes to the leaves, and those of the leaves to the nodes above. Returns whether every
@@ -302,6 +324,32 @@ impl Tree {
         right.into_inner()
     }
 
+    /// Writes the memberships of all boxes to the leaves, and their unions to the nodes above.
+    fn mark(&mut self, workers: &Workers, screen: Option<&Screen>) -> Result<(), Error> {
+        let Self { ids, levels, marks, .. } = self;
+        let Some(screen) = screen.filter(|screen| screen.is_partial()) else {
+            marks.clear();
+            return Ok(());
+        };
+        marks.resize_with(levels.len(), Vec::new);
+        for (marks, level) in marks.iter_mut().zip(&*levels) {
+            marks.truncate(level.len());
+            grow(marks, level.len(), Marks::EMPTY)?;
+        }
+        let leaves = &mut marks[0];
+        let size = leaves.len().div_ceil(workers.tasks()).max(SMALLEST_FILL * LANES);
+        workers.each_of(leaves.chunks_mut(size).zip(ids.chunks(size * LANES)), |(leaves, ids)| {
+            Marks::fill(leaves, ids, &screen.filter);
+        });
+        for level in 1..marks.len() {
+            let (below, here) = marks.split_at_mut(level);
+            for (node, below) in here[0].iter_mut().zip(below[level - 1].chunks(LANES)) {
+                *node = Marks::above(below);
+            }
+        }
+        Ok(())
+    }
+
     /// Returns half the surface area of all leaves, whose edges count as at most `longest`.
     fn half_area(&self, longest: f32) -> f64 {
         self.levels.get(1).map_or(0.0, |level| level.iter().map(|node| f64::from(node.half_area(longest))).sum())
@@ -318,10 +366,10 @@ impl Tree {
         is_sparse(self.places, boxes)
     }
 
-    /// Adds part `k` of `parts` of the pairs of its boxes with each other, without those of two fixed boxes.
+    /// Adds part `k` of `parts` of the pairs of its boxes with each other, without those of two passive boxes.
     pub(crate) fn self_pairs(&self, k: usize, parts: usize, pairs: &mut Pairs) {
-        // All pairs are found from the leaves with boxes that may move.
-        self.walk().self_pairs(self.simd, part(self.moving, k, parts), pairs);
+        // All pairs are found from the leaves with active boxes.
+        self.walk().self_pairs(self.simd, part(self.active, k, parts), pairs);
         self.sweeps.pairs(k, parts, pairs);
     }
 
@@ -330,14 +378,21 @@ impl Tree {
         self.walk().pairs_with(self.simd, group, pairs);
     }
 
-    /// Calls `found` for every box that overlaps these bounds. Returns the number of visited nodes.
+    /// Calls `found` for every box that overlaps these bounds, if a filter is tested only for those wanted `by` the box
+    /// with the bounds. Returns the number of visited nodes.
     #[inline]
-    pub(crate) fn overlapping(&self, bounds: &Aabb, mut found: impl FnMut(u32)) -> u32 {
-        self.walk().each_overlapping(self.simd, bounds, |place| found(self.ids[place]))
+    pub(crate) fn overlapping(
+        &self,
+        bounds: &Aabb,
+        by: impl FnOnce() -> Membership,
+        mut found: impl FnMut(u32),
+    ) -> u32 {
+        self.walk().each_overlapping(self.simd, bounds, by, |place| found(self.ids[place]))
     }
 
     fn walk(&self) -> Walk<'_> {
-        Walk { levels: &self.levels, ids: &self.ids, far: self.ids.len() > FAR, apart: self.sweeps.apart() }
+        let marks = Some(&self.marks[..]).filter(|marks| !marks.is_empty());
+        Walk { levels: &self.levels, ids: &self.ids, far: self.ids.len() > FAR, apart: self.sweeps.apart(), marks }
     }
 
     /// Returns the box at each place: place `p` is lane `p % 16` of leaf `p / 16`.
@@ -351,6 +406,7 @@ impl Tree {
         &mut self,
         boxes: &[Aabb],
         ids: impl Iterator<Item = u32>,
+        screen: Option<&Screen>,
         mut placed: impl FnMut(usize, u32),
     ) -> Result<(), Error> {
         self.appended.clear();
@@ -373,6 +429,17 @@ impl Tree {
         for (place, &key) in (self.places..).zip(&self.appended) {
             self.ids[place] = key as u32;
             placed(place, key as u32);
+        }
+        for (marks, level) in self.marks.iter_mut().zip(&self.levels) {
+            grow(marks, level.len(), Marks::EMPTY)?;
+        }
+        for (place, &key) in (self.places..).zip(&self.appended) {
+            let of = screen.map_or(&Membership::ALL, |screen| screen.filter.of(key as u32));
+            let mut at = place;
+            for marks in self.marks.iter_mut().take_while(|marks| !marks.is_empty()) {
+                marks[at / LANES].widen(at % LANES, of);
+                at /= LANES;
+            }
         }
         self.places += self.appended.len();
         Ok(())

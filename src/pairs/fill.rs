@@ -100,13 +100,19 @@ impl Pairs {
         }
     }
 
+    /// Adds the `added` pairs that were written to the head of [`Pairs::room`], lower member first. All are wanted.
+    #[inline]
+    pub(crate) fn extend_by_tested(&mut self, added: usize) {
+        self.len += added;
+    }
+
     /// Filters the pairs now: few are written at a time, so they are still in the first-level cache.
     #[cold]
     fn extend_by_wanted(&mut self, added: usize) {
         let Self { buffer, len, filter, unwanted, .. } = self;
         let written = &mut buffer[*len..*len + added];
-        let (wanted, others) = filter.as_ref().map_or((added, 0), |filter| filter.keep_wanted(written));
-        *unwanted += others as u64;
+        let wanted = filter.as_ref().map_or(added, |screen| screen.filter.keep_wanted(written));
+        *unwanted += (added - wanted) as u64;
         *len += wanted;
     }
 

@@ -4,6 +4,7 @@ use super::slots::{At, Slots};
 use crate::aabb::Aabb;
 use crate::cpu::{GrownTree, Members, Simd, SimdLevel, Workers};
 use crate::error::Error;
+use crate::filter::Membership;
 use crate::load::SceneStats;
 
 /// What it costs to sort a box into a tree, in nodes looked at by queries: 25 and 5 ns on the Zen 3 host of `datasets/`.
@@ -96,7 +97,7 @@ impl Resting {
             (self.fresh, self.excess) = ([0; 2], 0);
             self.tree.build(&self.workers, boxes, Members::Of(&self.members), &stats, None)?;
         } else {
-            self.tree.insert(boxes, arrivals.iter().copied(), 0)?;
+            self.tree.insert(boxes, arrivals.iter().copied(), 0, None)?;
             self.tree.refit(&self.workers, boxes, std::iter::once(&arrivals[..]))?;
         }
         self.is_built = true;
@@ -107,7 +108,7 @@ impl Resting {
 
     /// Calls `found` for each body whose box overlaps these bounds.
     pub(super) fn overlapping(&mut self, bounds: &Aabb, found: impl FnMut(u32)) {
-        let nodes = u64::from(self.tree.overlapping(bounds, found));
+        let nodes = u64::from(self.tree.overlapping(bounds, || Membership::ALL, found));
         let [looked, queries] = self.fresh;
         if queries < FRESH {
             self.fresh = [looked + nodes, queries + 1];

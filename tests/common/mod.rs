@@ -74,7 +74,8 @@ pub(crate) fn naive_filtered(boxes: &[Aabb], memberships: &[Membership]) -> Vec<
     let mut pairs = naive(boxes);
     pairs.retain(|&(i, j)| {
         let (a, b) = (of(i), of(j));
-        a.groups & b.mask != 0 && b.groups & a.mask != 0 && !(a.fixed && b.fixed)
+        let apart = a.owner == 0 || a.owner != b.owner;
+        a.groups & b.mask != 0 && b.groups & a.mask != 0 && !(a.fixed && b.fixed) && apart
     });
     pairs
 }
@@ -91,13 +92,17 @@ impl Random {
         (self.0 >> 40) as f32 / (1_u64 << 24) as f32
     }
 
-    /// Returns one or two of eight groups and a mask without some of them. One box in four is fixed, one in sixteen is
-    /// in every group.
+    /// Returns one or two of eight groups and a mask without some of them. One box in four is fixed, three in four
+    /// have one of three owners, and one in sixteen is in every group.
     pub(crate) fn membership(&mut self) -> Membership {
         let group = |at: f32| 1 << (at * 8.0) as u32;
         let (groups, mask) = (group(self.next()) | group(self.next()), !(group(self.next()) | group(self.next())));
         let fixed = self.next() < 0.25;
-        if self.next() < 1.0 / 16.0 { Membership::default() } else { Membership { groups, mask, fixed } }
+        if self.next() < 1.0 / 16.0 {
+            Membership::default()
+        } else {
+            Membership { groups, mask, fixed, owner: (self.next() * 4.0) as u32 }
+        }
     }
 
     /// Returns cubes of up to 1.1 times this half edge in a world of this size.

@@ -263,7 +263,7 @@ impl PyBroadPhase {
             let (groups, masks, fixed): Columns<'_> = columns.extract()?;
             let (groups, masks, fixed) = (groups.to_vec()?, masks.to_vec()?, fixed.to_vec()?);
             let each = groups.into_iter().zip(masks).zip(fixed);
-            Some(Arc::new(each.map(|((groups, mask), fixed)| Membership { groups, mask, fixed }).collect()))
+            Some(Arc::new(each.map(|((groups, mask), fixed)| Membership { groups, mask, fixed, owner: 0 }).collect()))
         };
         // Raises if it is closed.
         self.shared(py)?;

@@ -293,7 +293,7 @@ pub(crate) fn pairs_between<'py>(
         engine.both.extend_from_slice(a);
         engine.both.extend_from_slice(b);
         // Most methods never compare two fixed boxes: that saves the search within the longer list, most of the work.
-        let of = |groups, mask, fixed| Membership { groups, mask, fixed };
+        let of = |groups, mask, fixed| Membership { groups, mask, fixed, owner: 0 };
         let (in_a, in_b) = (of(0b01, 0b10, a.len() > b.len()), of(0b10, 0b01, a.len() <= b.len()));
         let mut memberships = Vec::new();
         memberships.try_reserve_exact(objects).map_err(refused)?;

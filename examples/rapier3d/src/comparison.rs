@@ -213,6 +213,7 @@ fn membership(physics: &PhysicsWorld, collider: &Collider) -> Membership {
         groups: groups.memberships.bits(),
         mask: groups.filter.bits(),
         fixed: !body.is_some_and(RigidBody::is_dynamic),
+        owner: 0,
     }
 }
 

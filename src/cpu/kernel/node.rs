@@ -1,6 +1,7 @@
 //! Sixteen boxes as columns, tested together against one box.
 
 use crate::aabb::Aabb;
+use crate::cpu::tree::NOBODY;
 
 /// Boxes in a node.
 pub(crate) const LANES: usize = 16;
@@ -19,7 +20,7 @@ pub(crate) struct Group {
     pub(super) node: Node,
     /// The bounds of all boxes.
     pub(super) bounds: Aabb,
-    /// Their positions in the input.
+    /// Their positions in the input; [`NOBODY`] in an empty lane.
     pub(super) ids: [u32; LANES],
 }
 
@@ -100,7 +101,7 @@ impl Node {
 impl Group {
     /// Makes a group without boxes, for boxes near these bounds.
     pub(crate) fn of(bounds: &Aabb) -> Self {
-        Self { node: Node::EMPTY, bounds: *bounds, ids: [0; LANES] }
+        Self { node: Node::EMPTY, bounds: *bounds, ids: [NOBODY; LANES] }
     }
 
     /// Writes a box to an empty lane.

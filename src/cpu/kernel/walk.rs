@@ -1,9 +1,11 @@
 //! Walks through a tree of nodes: finds the boxes that overlap a box, and the overlapping pairs.
 
+use super::marks::{Marks, Wanted};
 use super::node::{Group, LANES, Node};
 use super::{prefetch, write_each};
 use crate::aabb::Aabb;
 use crate::cpu::level::Simd;
+use crate::filter::Membership;
 use crate::pair::Pair;
 use crate::pairs::{Pairs, each_bit};
 use std::ops::Range;
@@ -21,7 +23,26 @@ pub(crate) struct Walk<'a> {
     pub(crate) far: bool,
     /// Leaves that are not compared with each other, ascending by `others`.
     pub(crate) apart: &'a [Apart],
+    /// The memberships of all nodes, if walks test them.
+    pub(crate) marks: Option<&'a [Vec<Marks>]>,
 }
+
+/// The boxes that are compared with those of a leaf.
+struct Side<'a, W: Wanted> {
+    node: &'a Node,
+    bounds: &'a Aabb,
+    ids: &'a [u32; LANES],
+    marks: W,
+    /// What the marks of others are tested by.
+    by: &'a W::Query,
+}
+
+/// Returns what a walk tests beside bounds, for a level and a node of it.
+trait MarksOf<W>: Fn(usize, usize) -> W + Copy {}
+impl<W, F: Fn(usize, usize) -> W + Copy> MarksOf<W> for F {}
+
+/// Returns nothing to test.
+fn unmarked(_level: usize, _node: usize) {}
 
 /// Leaves whose pairs with others behind them are found in another way.
 #[derive(Debug)]
@@ -40,18 +61,39 @@ const MOST_LEVELS: usize = 9;
 const EVERY: Range<usize> = 0..usize::MAX;
 
 impl Walk<'_> {
-    /// Calls `found` for every place in the leaves whose box overlaps `b`. Returns the number of nodes compared with
-    /// it.
+    /// Calls `found` for every place in the leaves whose box overlaps `b` and, if the tree has marks, is wanted `by` the
+    /// box. Returns the number of nodes compared with it.
     #[inline]
-    pub(crate) fn each_overlapping(&self, simd: Simd, b: &Aabb, found: impl FnMut(usize)) -> u32 {
+    pub(crate) fn each_overlapping(
+        &self,
+        simd: Simd,
+        b: &Aabb,
+        by: impl FnOnce() -> Membership,
+        found: impl FnMut(usize),
+    ) -> u32 {
+        match self.marks {
+            None => self.each_wanted(simd, b, unmarked, &(), found),
+            Some(marks) => self.each_wanted(simd, b, |level, node| &marks[level][node], &by(), found),
+        }
+    }
+
+    #[inline]
+    fn each_wanted<W: Wanted>(
+        &self,
+        simd: Simd,
+        b: &Aabb,
+        marks: impl MarksOf<W>,
+        by: &W::Query,
+        found: impl FnMut(usize),
+    ) -> u32 {
         match simd {
             // SAFETY: the proof says that this CPU has the instructions.
             #[cfg(target_arch = "x86_64")]
-            Simd::Avx512(_) => unsafe { x86::each_avx512(self, b, found) },
+            Simd::Avx512(_) => unsafe { x86::each_avx512(self, b, marks, by, found) },
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
-            Simd::Avx2(_) => unsafe { x86::each_avx2(self, b, found) },
-            Simd::Portable => self.each(b, EVERY, 0, Node::overlapping, found),
+            Simd::Avx2(_) => unsafe { x86::each_avx2(self, b, marks, by, found) },
+            Simd::Portable => self.each((b, by), EVERY, 0, Node::overlapping, marks, found),
         }
     }
 
@@ -60,17 +102,31 @@ impl Walk<'_> {
         if pairs.is_any_over() {
             return;
         }
+        match self.marks {
+            None => self.wanted_self_pairs(simd, leaves, unmarked, pairs),
+            Some(marks) => self.wanted_self_pairs(simd, leaves, |level, node| &marks[level][node], pairs),
+        }
+    }
+
+    fn wanted_self_pairs<W: Wanted>(
+        &self,
+        simd: Simd,
+        leaves: Range<usize>,
+        marks: impl MarksOf<W>,
+        pairs: &mut Pairs,
+    ) {
         match simd {
             // SAFETY: the proof says that this CPU has the instructions.
             #[cfg(target_arch = "x86_64")]
-            Simd::Avx512(_) => unsafe { x86::self_avx512(self, leaves, pairs) },
+            Simd::Avx512(_) => unsafe { x86::self_avx512(self, leaves, marks, pairs) },
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
-            Simd::Avx2(_) => unsafe { x86::self_avx2(self, leaves, pairs) },
+            Simd::Avx2(_) => unsafe { x86::self_avx2(self, leaves, marks, pairs) },
             Simd::Portable => self.leaves_with_all_behind(
                 leaves,
                 Node::overlapping,
                 |i, j, hits, to| write_each(i, j, hits, to),
+                marks,
                 pairs,
             ),
         }
@@ -81,43 +137,63 @@ impl Walk<'_> {
         if pairs.is_any_over() {
             return;
         }
+        let Some(marks) = self.marks else { return self.wanted_pairs_with(simd, group, (), unmarked, pairs) };
+        let of_group = pairs.screen().map_or(Marks::ALL, |screen| Marks::of(&group.ids, &screen.filter));
+        self.wanted_pairs_with(simd, group, &of_group, |level, node| &marks[level][node], pairs);
+    }
+
+    fn wanted_pairs_with<W: Wanted>(
+        &self,
+        simd: Simd,
+        group: &Group,
+        of_group: W,
+        marks: impl MarksOf<W>,
+        pairs: &mut Pairs,
+    ) {
+        let by = of_group.query_all();
+        let side = Side { node: &group.node, bounds: &group.bounds, ids: &group.ids, marks: of_group, by: &by };
         match simd {
             // SAFETY: the proof says that this CPU has the instructions.
             #[cfg(target_arch = "x86_64")]
-            Simd::Avx512(_) => unsafe { x86::group_avx512(self, group, pairs) },
+            Simd::Avx512(_) => unsafe { x86::group_avx512(self, &side, marks, pairs) },
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
-            Simd::Avx2(_) => unsafe { x86::group_avx2(self, group, pairs) },
+            Simd::Avx2(_) => unsafe { x86::group_avx2(self, &side, marks, pairs) },
             Simd::Portable => {
-                self.group_with_all(group, Node::overlapping, |i, j, hits, to| write_each(i, j, hits, to), pairs);
+                self.group_with_all(&side, Node::overlapping, |i, j, hits, to| write_each(i, j, hits, to), marks, pairs)
             }
         }
     }
 
     #[inline(always)]
-    fn leaves_with_all_behind(
+    fn leaves_with_all_behind<W: Wanted>(
         &self,
         leaves: Range<usize>,
         overlapping: impl Fn(&Node, &Aabb) -> u32 + Copy,
         write: impl Write,
+        marks: impl MarksOf<W>,
         pairs: &mut Pairs,
     ) {
         for leaf in leaves {
             let node = &self.levels[0][leaf];
             let ids = self.ids_of(leaf);
-            for (lane, &id) in ids.iter().enumerate() {
+            let (mine, by) = (marks(0, leaf), marks(1, leaf / LANES).query(leaf % LANES));
+            let wants_own = !W::TESTS || mine.among(u32::MAX, &by) != 0;
+            for (lane, &id) in ids.iter().enumerate().filter(|_| wants_own) {
                 // Only lanes behind this one: each pair is found from its first lane.
                 let hits = overlapping(node, &node.lane(lane)) & (u32::MAX - 1) << lane;
+                let hits = mine.among(hits, &mine.query(lane));
                 if hits != 0 {
-                    add(id, ids, hits, write, pairs);
+                    add::<W>(id, ids, hits, write, pairs);
                 }
             }
             let bounds = self.bounds_of(leaf);
+            let side = Side { node, bounds: &bounds, ids, marks: mine, by: &by };
             let mut from = leaf + 1;
             let apart = self.apart.iter().filter(|apart| apart.leaves.contains(&leaf)).map(|apart| &apart.others);
             for Range { start, end } in apart.chain([&(usize::MAX..usize::MAX)]) {
-                self.each(&bounds, from..*start, 1, overlapping, |other| {
-                    self.meet((node, &bounds, ids), other, overlapping, write, pairs);
+                self.each((&bounds, &by), from..*start, 1, overlapping, marks, |other| {
+                    self.meet(&side, other, overlapping, write, marks, pairs);
                 });
                 from = *end;
             }
@@ -129,44 +205,49 @@ impl Walk<'_> {
     }
 
     #[inline(always)]
-    fn group_with_all(
+    fn group_with_all<W: Wanted>(
         &self,
-        group: &Group,
+        group: &Side<'_, W>,
         overlapping: impl Fn(&Node, &Aabb) -> u32 + Copy,
         write: impl Write,
+        marks: impl MarksOf<W>,
         pairs: &mut Pairs,
     ) {
-        self.each(&group.bounds, EVERY, 1, overlapping, |other| {
-            self.meet((&group.node, &group.bounds, &group.ids), other, overlapping, write, pairs);
+        self.each((group.bounds, group.by), EVERY, 1, overlapping, marks, |other| {
+            self.meet(group, other, overlapping, write, marks, pairs);
         });
     }
 
-    /// Adds the pairs of the boxes of a node, given with its bounds and ids, with those of a leaf.
+    /// Adds the pairs of the boxes of a node with those of a leaf.
     #[inline(always)]
-    fn meet(
+    fn meet<W: Wanted>(
         &self,
-        (boxes, bounds, ids): (&Node, &Aabb, &[u32; LANES]),
+        side: &Side<'_, W>,
         leaf: usize,
         overlapping: impl Fn(&Node, &Aabb) -> u32,
         write: impl Write,
+        marks: impl MarksOf<W>,
         pairs: &mut Pairs,
     ) {
+        let (boxes, ids) = (side.node, side.ids);
         let (node, others) = (&self.levels[0][leaf], self.ids_of(leaf));
+        let their_marks = marks(0, leaf);
         let mine = overlapping(boxes, &self.bounds_of(leaf));
+        let mine = side.marks.among(mine, &marks(1, leaf / LANES).query(leaf % LANES));
         if mine == 0 {
             return;
         }
-        let theirs = overlapping(node, bounds);
+        let theirs = their_marks.among(overlapping(node, side.bounds), side.by);
         // Usually few boxes reach into the other leaf: take them from the side that has fewer.
-        let (few, few_ids, many, many_ids, all) = if mine.count_ones() <= theirs.count_ones() {
-            (boxes, ids, node, others, mine)
+        let (few, few_ids, few_marks, many, many_ids, many_marks, all) = if mine.count_ones() <= theirs.count_ones() {
+            (boxes, ids, side.marks, node, others, their_marks, mine)
         } else {
-            (node, others, boxes, ids, theirs)
+            (node, others, their_marks, boxes, ids, side.marks, theirs)
         };
         each_bit(all, |lane| {
-            let hits = overlapping(many, &few.lane(lane));
+            let hits = many_marks.among(overlapping(many, &few.lane(lane)), &few_marks.query(lane));
             if hits != 0 {
-                add(few_ids[lane], many_ids, hits, write, pairs);
+                add::<W>(few_ids[lane], many_ids, hits, write, pairs);
             }
         });
     }
@@ -177,7 +258,7 @@ impl Walk<'_> {
         let step = some.len().div_ceil(SAMPLE).max(1);
         let mut tests = 0;
         for leaf in some.skip(step / 2).step_by(step) {
-            self.each(&self.bounds_of(leaf), others.clone(), 1, Node::overlapping, |other| {
+            self.each((&self.bounds_of(leaf), &()), others.clone(), 1, Node::overlapping, unmarked, |other| {
                 let reach = Node::overlapping(&self.levels[0][leaf], &self.bounds_of(other));
                 tests += 1 + u64::from(reach.count_ones());
             });
@@ -199,15 +280,16 @@ impl Walk<'_> {
         &self.ids.as_chunks().0[leaf]
     }
 
-    /// Calls `found` for every lane of level `bottom`, of those with these numbers, that overlaps a box. Lane k of node
-    /// n has the number 16 n + k. Returns the number of nodes compared with the box.
+    /// Calls `found` for every lane of level `bottom`, of those with these numbers, that overlaps a box and may be
+    /// wanted by it. Lane k of node n has the number 16 n + k. Returns the number of nodes compared with the box.
     #[inline(always)]
-    fn each(
+    fn each<W: Wanted>(
         &self,
-        b: &Aabb,
+        (b, by): (&Aabb, &W::Query),
         Range { start, end }: Range<usize>,
         bottom: usize,
         overlapping: impl Fn(&Node, &Aabb) -> u32,
+        marks: impl MarksOf<W>,
         mut found: impl FnMut(usize),
     ) -> u32 {
         let Some(top) = self.levels.iter().rposition(|level| !level.is_empty()) else { return 0 };
@@ -225,7 +307,7 @@ impl Walk<'_> {
             // For each level: the node whose children are visited, and a mask of those left.
             let mut open = [(0, 0); MOST_LEVELS];
             let mut at = top;
-            open[at] = (root, overlapping(&self.levels[at][root], b) & lanes(at, root));
+            open[at] = (root, marks(at, root).among(overlapping(&self.levels[at][root], b) & lanes(at, root), by));
             looked += 1;
             loop {
                 let (node, left) = &mut open[at];
@@ -246,7 +328,7 @@ impl Walk<'_> {
                     below.get(next).into_iter().for_each(prefetch);
                 }
                 at -= 1;
-                open[at] = (child, overlapping(&below[child], b) & lanes(at, child));
+                open[at] = (child, marks(at, child).among(overlapping(&below[child], b) & lanes(at, child), by));
                 looked += 1;
             }
         }
@@ -261,10 +343,11 @@ impl<F: Fn(u32, &[u32; LANES], u32, &mut [Pair; LANES]) + Copy> Write for F {}
 
 /// Adds the pairs of a box with each of `others` whose bit is set.
 #[inline(always)]
-fn add(id: u32, others: &[u32; LANES], hits: u32, write: impl Write, pairs: &mut Pairs) {
+fn add<W: Wanted>(id: u32, others: &[u32; LANES], hits: u32, write: impl Write, pairs: &mut Pairs) {
     if let Some(room) = pairs.room(LANES).and_then(|room| room.first_chunk_mut()) {
         write(id, others, hits, room);
-        pairs.extend_by(hits.count_ones() as usize);
+        let count = hits.count_ones() as usize;
+        if W::TESTS { pairs.extend_by_tested(count) } else { pairs.extend_by(count) }
     } else {
         pairs.push_mask(id, others, hits);
     }
@@ -272,9 +355,9 @@ fn add(id: u32, others: &[u32; LANES], hits: u32, write: impl Write, pairs: &mut
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use super::{EVERY, Walk};
+    use super::{EVERY, MarksOf, Side, Walk, Wanted};
     use crate::aabb::Aabb;
-    use crate::cpu::kernel::node::{Group, Node};
+    use crate::cpu::kernel::node::Node;
     use crate::cpu::kernel::x86::{write_avx2, write_avx512};
     use crate::pairs::Pairs;
     use std::arch::x86_64::*;
@@ -316,51 +399,87 @@ mod x86 {
     }
 
     #[target_feature(enable = "avx512f")]
-    pub(super) fn each_avx512(walk: &Walk<'_>, b: &Aabb, found: impl FnMut(usize)) -> u32 {
-        walk.each(b, EVERY, 0, |node, b| overlapping_avx512(node, b), found)
+    pub(super) fn each_avx512<W: Wanted>(
+        walk: &Walk<'_>,
+        b: &Aabb,
+        marks: impl MarksOf<W>,
+        by: &W::Query,
+        found: impl FnMut(usize),
+    ) -> u32 {
+        walk.each((b, by), EVERY, 0, |node, b| overlapping_avx512(node, b), marks, found)
     }
 
     #[target_feature(enable = "avx2")]
-    pub(super) fn each_avx2(walk: &Walk<'_>, b: &Aabb, found: impl FnMut(usize)) -> u32 {
-        walk.each(b, EVERY, 0, |node, b| overlapping_avx2(node, b), found)
+    pub(super) fn each_avx2<W: Wanted>(
+        walk: &Walk<'_>,
+        b: &Aabb,
+        marks: impl MarksOf<W>,
+        by: &W::Query,
+        found: impl FnMut(usize),
+    ) -> u32 {
+        walk.each((b, by), EVERY, 0, |node, b| overlapping_avx2(node, b), marks, found)
     }
 
     #[target_feature(enable = "avx512f")]
-    pub(super) fn self_avx512(walk: &Walk<'_>, leaves: Range<usize>, pairs: &mut Pairs) {
+    pub(super) fn self_avx512<W: Wanted>(
+        walk: &Walk<'_>,
+        leaves: Range<usize>,
+        marks: impl MarksOf<W>,
+        pairs: &mut Pairs,
+    ) {
         walk.leaves_with_all_behind(
             leaves,
             |node, b| overlapping_avx512(node, b),
             |i, j, hits, to| write_avx512(i, j, hits, to),
+            marks,
             pairs,
         );
     }
 
     #[target_feature(enable = "avx2")]
-    pub(super) fn self_avx2(walk: &Walk<'_>, leaves: Range<usize>, pairs: &mut Pairs) {
+    pub(super) fn self_avx2<W: Wanted>(
+        walk: &Walk<'_>,
+        leaves: Range<usize>,
+        marks: impl MarksOf<W>,
+        pairs: &mut Pairs,
+    ) {
         walk.leaves_with_all_behind(
             leaves,
             |node, b| overlapping_avx2(node, b),
             |i, j, hits, to| write_avx2(i, j, hits, to),
+            marks,
             pairs,
         );
     }
 
     #[target_feature(enable = "avx512f")]
-    pub(super) fn group_avx512(walk: &Walk<'_>, group: &Group, pairs: &mut Pairs) {
+    pub(super) fn group_avx512<W: Wanted>(
+        walk: &Walk<'_>,
+        group: &Side<'_, W>,
+        marks: impl MarksOf<W>,
+        pairs: &mut Pairs,
+    ) {
         walk.group_with_all(
             group,
             |node, b| overlapping_avx512(node, b),
             |i, j, hits, to| write_avx512(i, j, hits, to),
+            marks,
             pairs,
         );
     }
 
     #[target_feature(enable = "avx2")]
-    pub(super) fn group_avx2(walk: &Walk<'_>, group: &Group, pairs: &mut Pairs) {
+    pub(super) fn group_avx2<W: Wanted>(
+        walk: &Walk<'_>,
+        group: &Side<'_, W>,
+        marks: impl MarksOf<W>,
+        pairs: &mut Pairs,
+    ) {
         walk.group_with_all(
             group,
             |node, b| overlapping_avx2(node, b),
             |i, j, hits, to| write_avx2(i, j, hits, to),
+            marks,
             pairs,
         );
     }
@@ -385,14 +504,14 @@ mod tests {
     #[test]
     fn every_level_finds_the_lanes_that_overlap() {
         let (boxes, levels, ids) = scene();
-        let walk = Walk { levels: &levels, ids: &ids, far: true, apart: &[] };
+        let walk = Walk { levels: &levels, ids: &ids, far: true, apart: &[], marks: None };
         let infinite = Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]);
         let queries = (0..60).map(|k| Aabb::cube([(k % 34) as f32, (k % 13) as f32, (k % 11) as f32], 0.1 * k as f32));
         for query in queries.chain([infinite]) {
             let expected: Vec<usize> = (0..boxes.len()).filter(|&k| boxes[k].overlaps(&query)).collect();
             for simd in Simd::every() {
                 let mut found = Vec::new();
-                let looked = walk.each_overlapping(simd, &query, |k| found.push(k));
+                let looked = walk.each_overlapping(simd, &query, || Membership::ALL, |k| found.push(k));
                 assert_eq!(found, expected, "{simd:?}");
                 assert!(looked >= 2 && looked as usize <= 2 + 19);
             }
@@ -425,7 +544,7 @@ mod tests {
     #[test]
     fn every_level_finds_each_pair_once() {
         let (boxes, levels, ids) = scene();
-        let walk = Walk { levels: &levels, ids: &ids, far: false, apart: &[] };
+        let walk = Walk { levels: &levels, ids: &ids, far: false, apart: &[], marks: None };
         let mut expected = Pairs::new();
         (0..300_u32).for_each(|j| {
             (0..j).filter(|&i| boxes[i as usize].overlaps(&boxes[j as usize])).for_each(|i| expected.push(i, j));

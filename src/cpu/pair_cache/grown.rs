@@ -7,7 +7,7 @@ use crate::cpu::kernel::contain::{each_doubtful_block, within};
 use crate::cpu::level::Simd;
 use crate::cpu::workers::Workers;
 use crate::error::Error;
-use crate::filter::Filter;
+use crate::filter::{Filter, Membership};
 use std::ops::Range;
 
 /// Contains no box, not even an infinite one: a box that has no grown box yet counts as having left it.
@@ -20,6 +20,8 @@ pub(super) struct Grown {
     len: usize,
     /// One for each 64 boxes.
     flags: Vec<Flags>,
+    /// Those by which the kept pairs were found; empty without a filter.
+    memberships: Vec<Membership>,
     simd: Simd,
 }
 
@@ -28,8 +30,6 @@ pub(super) struct Grown {
 struct Flags {
     /// The box got a new grown box in this frame, or was removed.
     dirty: u64,
-    /// The box is fixed: its pairs with other fixed boxes are not kept.
-    fixed: u64,
 }
 
 /// The growth of a box on each side, as a share of its mean edge.
@@ -63,7 +63,7 @@ pub(super) struct Changes {
 
 impl Grown {
     pub(super) fn new(simd: Simd) -> Self {
-        Self { boxes: Vec::new(), len: 0, flags: Vec::new(), simd }
+        Self { boxes: Vec::new(), len: 0, flags: Vec::new(), memberships: Vec::new(), simd }
     }
 
     pub(super) fn as_slice(&self) -> &[Aabb] {
@@ -86,7 +86,8 @@ impl Grown {
         self.len.div_ceil(tasks).next_multiple_of(64).max(64)
     }
 
-    /// Runs one phase: grows every box anew that has left its grown box or is no longer fixed, and those in `again`.
+    /// Runs one phase: grows every box anew that has left its grown box or may be wanted with
+    /// others than before, and those in `again`.
     ///
     /// # Errors
     /// [`Error::InvalidBox`]. Then the grown boxes are of no use.
@@ -109,6 +110,7 @@ impl Grown {
             *b = Aabb::new(centre, centre);
         }
         self.len = boxes.len();
+        self.update_memberships(workers, filter)?;
         let size = self.share_len(shares.len());
         for share in shares.iter_mut() {
             // A task without a part in this frame must not report the previous one.
@@ -121,7 +123,6 @@ impl Grown {
         let flags = (&mut self.flags[..self.len.div_ceil(64)], size / 64);
         workers.each_share(shares, grown, flags, |k, share, grown, flags| {
             let first = k * size;
-            update_fixed(flags, grown, first, filter);
             share.error = share.check(&boxes[first..first + grown.len()], grown, flags, first, margin, simd).err();
         });
         shares.iter_mut().find_map(|s| s.error.take()).map_or(Ok(()), Err)?;
@@ -147,20 +148,45 @@ impl Grown {
         });
     }
 
-    /// Calls `found` for every box whose grown box overlaps the new one of box `i`, unless both are fixed. If both have
-    /// new ones, only the call for the lower box finds the pair. Returns the number of visited nodes of the tree.
+    /// Calls `found` for every wanted box whose grown box overlaps the new one of box `i`. If both have new ones, only
+    /// the call for the lower box finds the pair. Returns the number of visited nodes of the tree.
     #[inline]
     pub(super) fn meet(&self, tree: &GrownTree, i: u32, mut found: impl FnMut(u32)) -> u32 {
-        let (bounds, fixed) = (&self.boxes[i as usize], self.is_fixed(i));
-        tree.overlapping(bounds, |j| {
-            if (j > i || !self.is_new(j)) && !(fixed && self.is_fixed(j)) {
-                found(j);
-            }
-        })
+        let (bounds, of_i) = (&self.boxes[i as usize], self.memberships.get(i as usize));
+        tree.overlapping(
+            bounds,
+            || of_i.copied().unwrap_or_default(),
+            |j| {
+                if (j > i || !self.is_new(j)) && of_i.is_none_or(|of_i| of_i.wants(&self.memberships[j as usize])) {
+                    found(j);
+                }
+            },
+        )
     }
 
-    fn is_fixed(&self, id: u32) -> bool {
-        self.flags[id as usize / 64].fixed >> (id % 64) & 1 == 1
+    /// Takes the memberships of this frame. The pairs of a box that may be wanted with others than before are not all
+    /// kept, so it gets a grown box that it has left.
+    fn update_memberships(&mut self, workers: &Workers, filter: Option<&Filter>) -> Result<(), Error> {
+        let Self { boxes, len, memberships, .. } = self;
+        if filter.is_none() && memberships.is_empty() {
+            return Ok(());
+        }
+        ensure(memberships, *len, "memberships")?;
+        let size = len.div_ceil(workers.tasks()).max(1);
+        let parts = boxes[..*len].chunks_mut(size).zip(memberships.chunks_mut(size)).zip((0..).step_by(size));
+        workers.each_of(parts, |((boxes, memberships), first)| {
+            for ((grown, before), id) in boxes.iter_mut().zip(memberships).zip(first as u32..) {
+                let now = filter.map_or(&Membership::ALL, |filter| filter.of(id));
+                if !now.is_within(before) {
+                    *grown = NOTHING;
+                }
+                *before = *now;
+            }
+        });
+        if filter.is_none() {
+            memberships.clear();
+        }
+        Ok(())
     }
 
     /// Returns whether a box of a kept pair got a new grown box or was removed.
@@ -174,20 +200,6 @@ impl Grown {
     #[inline(always)]
     fn is_new(&self, id: u32) -> bool {
         self.flags[id as usize / 64].dirty >> (id % 64) & 1 == 1
-    }
-}
-
-/// Updates the fixed flags. Not all pairs of a box that is no longer fixed are kept, so it gets a grown box that it has
-/// left.
-fn update_fixed(flags: &mut [Flags], grown: &mut [Aabb], first: usize, filter: Option<&Filter>) {
-    for ((flags, grown), first) in flags.iter_mut().zip(grown.chunks_mut(64)).zip((first..).step_by(64)) {
-        let fixed =
-            filter.map_or(0, |f| (0..grown.len()).fold(0, |bits, k| bits | u64::from(f.is_fixed(first + k)) << k));
-        let freed = flags.fixed & !fixed;
-        flags.fixed = fixed;
-        if freed != 0 {
-            grown.iter_mut().enumerate().filter(|(k, _)| freed >> k & 1 == 1).for_each(|(_, grown)| *grown = NOTHING);
-        }
     }
 }
 
@@ -214,7 +226,8 @@ impl Share {
                     return;
                 }
                 let before = std::mem::replace(grown, margin.grow(b));
-                if !before.overlaps(grown) {
+                // A box without bounds on any side overlaps even `NOTHING`.
+                if before == NOTHING || !before.overlaps(grown) {
                     self.far.push((first + at + k) as u32);
                 }
                 flags[(at + k) / 64].dirty |= 1 << ((at + k) % 64);

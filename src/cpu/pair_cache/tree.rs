@@ -12,7 +12,7 @@ use crate::cpu::sort::sort;
 use crate::cpu::tree::{Members, NOBODY, Tree};
 use crate::cpu::workers::Workers;
 use crate::error::Error;
-use crate::filter::Filter;
+use crate::filter::{Membership, Screen};
 use crate::load::SceneStats;
 use crate::pairs::Pairs;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
@@ -68,9 +68,9 @@ impl GrownTree {
         boxes: &[Aabb],
         members: Members<'_>,
         stats: &SceneStats,
-        filter: Option<&Filter>,
+        screen: Option<&Screen>,
     ) -> Result<(), Error> {
-        self.tree.build(workers, boxes, members, stats, filter)?;
+        self.tree.build(workers, boxes, members, stats, screen)?;
         self.note_places(workers, boxes.len())
     }
 
@@ -79,11 +79,11 @@ impl GrownTree {
         &mut self,
         workers: &Workers,
         boxes: &[Aabb],
-        filter: Option<&Filter>,
+        screen: Option<&Screen>,
         wanted: bool,
     ) -> Result<bool, Error> {
         let goes_on = wanted || self.tree.is_being_renewed();
-        let renewed = goes_on && self.tree.renew(workers, boxes, || SceneStats::of(boxes), filter)?;
+        let renewed = goes_on && self.tree.renew(workers, boxes, || SceneStats::of(boxes), screen)?;
         if renewed {
             self.note_places(workers, boxes.len())?;
         }
@@ -131,11 +131,12 @@ impl GrownTree {
         boxes: &[Aabb],
         ids: impl Iterator<Item = u32> + Clone,
         new: usize,
+        screen: Option<&Screen>,
     ) -> Result<(), Error> {
         ensure(&mut self.place_of, boxes.len(), "boxes in a tree")?;
         ids.clone().take_while(|&id| (id as usize) < new).for_each(|id| self.remove(id));
         let place_of = &mut self.place_of;
-        self.tree.append(boxes, ids, |place, id| *place_of[id as usize].0.get_mut() = place as u32)
+        self.tree.append(boxes, ids, screen, |place, id| *place_of[id as usize].0.get_mut() = place as u32)
     }
 
     /// Removes a box.
@@ -217,9 +218,9 @@ impl GrownTree {
         keys[first..end].iter().map(|&key| key as u32)
     }
 
-    /// Calls `found` for every box that overlaps these bounds. Returns the number of visited nodes.
+    /// See [`Tree::overlapping`].
     #[inline]
-    pub(crate) fn overlapping(&self, bounds: &Aabb, found: impl FnMut(u32)) -> u32 {
-        self.tree.overlapping(bounds, found)
+    pub(crate) fn overlapping(&self, bounds: &Aabb, by: impl FnOnce() -> Membership, found: impl FnMut(u32)) -> u32 {
+        self.tree.overlapping(bounds, by, found)
     }
 }

@@ -8,7 +8,7 @@ use crate::cpu::kernel::node::LANES;
 use crate::cpu::sort::sort;
 use crate::cpu::workers::Workers;
 use crate::error::Error;
-use crate::filter::Filter;
+use crate::filter::Screen;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
@@ -18,8 +18,8 @@ const CROWDED: usize = 2 * LANES;
 /// Boxes of a dense cell that all threads sort together. Smaller dense cells are dealt out to the threads.
 const LARGE: usize = 16_384;
 
-/// The bit of a code that marks a fixed box. Curves leave it free.
-const FIXED: u32 = 1 << 31;
+/// The bit of a code that marks a passive box. Curves leave it free.
+const PASSIVE: u32 = 1 << 31;
 
 /// Sorts boxes along the curve.
 #[derive(Debug, Default)]
@@ -28,7 +28,7 @@ pub(super) struct Order {
     keys: Vec<u64>,
     len: usize,
     scratch: Vec<u64>,
-    /// Where the boxes of each shape stand, those that may move first: the axes on which they are oversized, one bit
+    /// Where the boxes of each shape stand, active ones first: the axes on which they are oversized, one bit
     /// each, and their places in the order.
     shapes: Vec<(u32, Range<usize>)>,
     /// Dense cells that are not sorted yet: the large ones, and the others.
@@ -73,18 +73,18 @@ impl Order {
         sort(workers, keys, &mut self.scratch)
     }
 
-    /// Sorts the members. Returns the number of boxes that may move; they come first.
+    /// Sorts the members. Returns the number of active boxes; they come first.
     pub(super) fn sort(
         &mut self,
         workers: &Workers,
         boxes: &[Aabb],
         members: Members<'_>,
         curve: &Curve,
-        filter: Option<&Filter>,
+        screen: Option<&Screen>,
     ) -> Result<usize, Error> {
         let len = members.len(boxes);
         self.begin(len)?;
-        self.code(workers, boxes, members, 0..len, curve, filter)?;
+        self.code(workers, boxes, members, 0..len, curve, screen)?;
         self.finish(workers, boxes)
     }
 
@@ -102,7 +102,7 @@ impl Order {
         members: Members<'_>,
         part: Range<usize>,
         curve: &Curve,
-        filter: Option<&Filter>,
+        screen: Option<&Screen>,
     ) -> Result<(), Error> {
         let keys = &mut self.keys[part.clone()];
         let invalid = AtomicUsize::new(usize::MAX);
@@ -111,8 +111,8 @@ impl Order {
             if !valid {
                 invalid.fetch_min(id, Relaxed);
             }
-            let fixed = if filter.is_some_and(|f| f.is_fixed(id)) { FIXED } else { 0 };
-            u64::from(code | fixed) << 32 | id as u64
+            let passive = if screen.is_some_and(|s| s.is_passive(id)) { PASSIVE } else { 0 };
+            u64::from(code | passive) << 32 | id as u64
         };
         match members {
             Members::From(first) => {
@@ -125,13 +125,13 @@ impl Order {
         boxes.get(invalid..).map_or(Ok(()), |rest| Aabb::check(rest, invalid))
     }
 
-    /// Sorts all keys. Returns the number of boxes that may move; they come first.
+    /// Sorts all keys. Returns the number of active boxes; they come first.
     pub(super) fn finish(&mut self, workers: &Workers, boxes: &[Aabb]) -> Result<usize, Error> {
         let keys = &mut self.keys[..self.len];
         sort(workers, keys, &mut self.scratch)?;
-        let moving = keys.partition_point(|&key| code(key) < FIXED);
+        let active = keys.partition_point(|&key| code(key) < PASSIVE);
         self.shapes.clear();
-        for (keys, first) in [(&keys[..moving], 0), (&keys[moving..], moving)] {
+        for (keys, first) in [(&keys[..active], 0), (&keys[active..], active)] {
             let mut at = 0;
             while at < keys.len() {
                 let shape = Curve::long_axes(code(keys[at]));
@@ -141,7 +141,7 @@ impl Order {
             }
         }
         self.sort_dense_cells(workers, boxes)?;
-        Ok(moving)
+        Ok(active)
     }
 
     /// Sorts the boxes of each dense cell along a curve through their own bounds, and so on with the dense cells of
@@ -238,11 +238,11 @@ mod tests {
         Aabb::cube([0, 1, 2].map(|a| unit(a) * scale + by[a as usize]), scale / 200.0)
     }
 
-    fn ordered(boxes: &[Aabb], threads: u32, filter: Option<&Filter>) -> (Vec<u32>, usize) {
+    fn ordered(boxes: &[Aabb], threads: u32, screen: Option<&Screen>) -> (Vec<u32>, usize) {
         let workers = Workers::new("tree", threads, &Threads::default()).unwrap();
         let mut order = Order::default();
         let curve = Curve::over(&SceneStats::of(boxes), boxes.len());
-        let moving = order.sort(&workers, boxes, Members::From(0), &curve, filter).unwrap();
+        let moving = order.sort(&workers, boxes, Members::From(0), &curve, screen).unwrap();
         (order.ids().iter().map(|&key| key as u32).collect(), moving)
     }
 
@@ -366,8 +366,8 @@ mod tests {
             })
             .collect();
         let membership = |k: u32| crate::Membership { fixed: k.is_multiple_of(3), ..crate::Membership::ALL };
-        let filter = Filter::new((0..4096).map(membership).collect());
-        let (ids, moving) = ordered(&boxes, 1, Some(&filter));
+        let screen = Screen::new(crate::Filter::new((0..4096).map(membership).collect()));
+        let (ids, moving) = ordered(&boxes, 1, Some(&screen));
         assert!(moving == 2730 && (0..4096).all(|k| ids[k].is_multiple_of(3) == (k >= moving)));
         let (ids, _) = ordered(&boxes, 1, None);
         let kind = |id: u32| (id % 64).min(3);

@@ -52,15 +52,15 @@ impl Sweeps {
         &self.apart
     }
 
-    /// Chooses the kinds whose pairs are cheaper to find here than with the tree, which has these boxes now. Fixed
-    /// boxes stand from leaf `moving` on.
+    /// Chooses the kinds whose pairs are cheaper to find here than with the tree, which has these boxes now.
+    /// Passive boxes stand from leaf `active` on.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]. The sweeps chosen until then are complete.
     pub(super) fn choose(
         &mut self,
         tree: &Walk<'_>,
-        moving: usize,
+        active: usize,
         simd: Simd,
         order: &mut Order,
         workers: &Workers,
@@ -71,7 +71,7 @@ impl Sweeps {
         apart.clear();
         let mut is_sorted = 0_u64;
         for (j, b) in kinds.iter().enumerate() {
-            for (i, a) in kinds[..j].iter().enumerate().filter(|(_, a)| a.leaves.start < moving) {
+            for (i, a) in kinds[..j].iter().enumerate().filter(|(_, a)| a.leaves.start < active) {
                 let (long, of_a, of_b) = (a.long | b.long, a.leaves.len() as u64, b.leaves.len() as u64);
                 let copies = COPY * (of_a + of_b);
                 // Saves the estimate if even a test of all boxes costs less.
@@ -225,13 +225,13 @@ mod tests {
             expected.set_filter(filter.clone());
             oracle.find_pairs(&boxes, &mut expected).unwrap();
             for (tree, upkeep) in &mut trees {
-                upkeep.update(tree, &workers, &boxes, || SceneStats::of(&boxes), filter.as_ref()).unwrap();
+                upkeep.update(tree, &workers, &boxes, || SceneStats::of(&boxes), expected.screen()).unwrap();
                 let mut pairs = Pairs::new();
                 pairs.set_filter(filter.clone());
                 (0..5).for_each(|k| tree.self_pairs(k, 5, &mut pairs));
                 assert_eq!((pairs.len(), pairs.fingerprint()), (expected.len(), expected.fingerprint()), "{frame}");
                 swept += usize::from(!tree.sweeps.swept.is_empty());
-                swept_fixed += usize::from(tree.sweeps.apart.iter().any(|apart| apart.others.start >= tree.moving));
+                swept_fixed += usize::from(tree.sweeps.apart.iter().any(|apart| apart.others.start >= tree.active));
             }
         }
         let all = trees.len() * FRAMES as usize;

@@ -12,7 +12,7 @@ use crate::clock::Instant;
 use crate::cpu::mean_time::MeanTime;
 use crate::cpu::workers::Workers;
 use crate::error::Error;
-use crate::filter::Filter;
+use crate::filter::Screen;
 use crate::load::SceneStats;
 
 /// Frames in which no refit is tried after one that was in vain, at most.
@@ -94,15 +94,15 @@ impl Upkeep {
         workers: &Workers,
         boxes: &[Aabb],
         stats: impl Fn() -> SceneStats,
-        filter: Option<&Filter>,
+        screen: Option<&Screen>,
     ) -> Result<(), Error> {
-        if self.refitted(tree, workers, boxes, &stats, filter) {
+        if self.refitted(tree, workers, boxes, &stats, screen) {
             return Ok(());
         }
         self.tree = None;
         let started = Instant::now();
         let stats = stats();
-        tree.build(workers, boxes, Members::From(0), &stats, filter)?;
+        tree.build(workers, boxes, Members::From(0), &stats, screen)?;
         self.build.add(each_ns(started, boxes.len()));
         #[cfg(test)]
         (self.builds += 1);
@@ -124,7 +124,7 @@ impl Upkeep {
         workers: &Workers,
         boxes: &[Aabb],
         stats: impl Fn() -> SceneStats,
-        filter: Option<&Filter>,
+        screen: Option<&Screen>,
     ) -> bool {
         let Some(mut known) = self.tree else { return false };
         let price = self.price();
@@ -137,7 +137,7 @@ impl Upkeep {
             return false;
         }
         let started = Instant::now();
-        if !tree.resize(workers, boxes, known.boxes, stats) || !tree.refit(workers, boxes, filter) {
+        if !tree.resize(workers, boxes, known.boxes, stats, screen) || !tree.refit(workers, boxes, screen) {
             return false;
         }
         let area = tree.half_area(known.longest) / boxes.len() as f64;
