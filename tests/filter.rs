@@ -134,6 +134,111 @@ fn fixed_boxes_are_freed_while_pairs_are_kept() {
     }
 }
 
+/// Nothing moves. Few memberships, owners among them, change their boxes and their share, so other boxes are passive.
+#[test]
+fn few_memberships_change_while_nothing_moves() {
+    let mut random = Random(17);
+    let boxes = random.cubes(1500, [11.0; 3], 0.6);
+    let of = |groups, mask| Membership { groups, mask, ..Membership::ALL };
+    let kinds = [
+        of(0b001, 0b010),
+        of(0b010, 0b101),
+        Membership { fixed: true, ..of(0b100, 0b110) },
+        Membership { owner: 5, ..Membership::ALL },
+    ];
+    let mut algorithms = every_algorithm();
+    let mut pairs = Pairs::with_order(PairOrder::Canonical);
+    pairs.set_filter(Some(Filter::new(vec![kinds[0]; 1450])));
+    for frame in 0..24 {
+        let changed = [0, 10, 700, 0, 90][frame % 5];
+        let kinds = [&kinds[..2], &kinds[..3], &kinds[1..]][frame / 8];
+        for _ in 0..changed {
+            let kind = kinds[(random.next() * kinds.len() as f32) as usize % kinds.len()];
+            pairs.filter_mut().unwrap().memberships[(random.next() * 1449.0) as usize] = kind;
+        }
+        let expected = naive_filtered(&boxes, &pairs.filter().unwrap().memberships);
+        for (id, algorithm) in &mut algorithms {
+            algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+            assert!(pairs.as_slice() == expected, "{id}, frame {frame}: {} pairs, not {}", pairs.len(), expected.len());
+        }
+    }
+}
+
+/// Returns whether a method rules out every unwanted pair before it finds it, and how many boxes it can take in a scene
+/// in which all overlap.
+fn kind_of(id: &str) -> (bool, usize) {
+    let method = id.split('@').next().unwrap();
+    (["bvh", "pair-cache"].contains(&method), if ["brute", "sap"].contains(&method) { 1500 } else { 20_000 })
+}
+
+#[test]
+fn forbidden_pile_is_not_searched() {
+    let membership = Membership { groups: 1, mask: 2, ..Membership::ALL };
+    for (id, mut algorithm) in every_algorithm() {
+        let count = kind_of(&id).1;
+        let mut pairs = Pairs::new();
+        pairs.set_filter(Some(Filter::new(vec![membership; count])));
+        for _ in 0..4 {
+            algorithm.find_pairs(&vec![Aabb::cube([3.0; 3], 0.5); count], &mut pairs).unwrap();
+            assert!(pairs.is_empty() && (pairs.overlapping() == 0 || id.starts_with("sap")), "{id}");
+        }
+    }
+}
+
+#[test]
+fn crowd_is_searched_from_its_sensors() {
+    const SENSORS: usize = 20;
+    let boxes = Random(3).cubes(20_000, [7.0; 3], 0.5);
+    let of = |groups, mask| Membership { groups, mask, ..Membership::ALL };
+    let memberships: Vec<Membership> =
+        (0..boxes.len()).map(|k| if k < SENSORS { of(1, 2) } else { of(2, 1) }).collect();
+    for (id, mut algorithm) in every_algorithm() {
+        let boxes = &boxes[..kind_of(&id).1];
+        let meets = |i: usize| (SENSORS..boxes.len()).filter(move |&j| boxes[i].overlaps(&boxes[j]));
+        let expected: Vec<_> = (0..SENSORS).flat_map(|i| meets(i).map(move |j| (i as u32, j as u32))).collect();
+        let mut pairs = Pairs::with_order(PairOrder::Canonical);
+        pairs.set_filter(Some(Filter::new(memberships.clone())));
+        for _ in 0..4 {
+            algorithm.find_pairs(boxes, &mut pairs).unwrap();
+            assert!(pairs.as_slice() == expected && !expected.is_empty(), "{id}: {} pairs", pairs.len());
+            let unwanted = pairs.overlapping() - pairs.len() as u64;
+            let most = if kind_of(&id).0 { 0 } else { SENSORS as u64 * SENSORS as u64 / 2 };
+            assert!(unwanted <= most || id.starts_with("sap"), "{id}: {unwanted} unwanted pairs");
+        }
+    }
+}
+
+#[test]
+fn bodies_are_not_searched_within() {
+    for (id, mut algorithm) in every_algorithm() {
+        // The strips of `grid-sap` know no owners.
+        let (early, most) = kind_of(&id);
+        let parts = if early { 1739 } else { most.min(5000) / 64 };
+        let mut random = Random(8);
+        let mut boxes = Vec::new();
+        for body in 0..64_usize {
+            let corner = [body / 16, body / 4 % 4, body % 4].map(|at| at as f32 * 4.0);
+            boxes.extend((0..parts).map(|_| Aabb::cube(corner.map(|at| at + random.next()), 0.5)));
+        }
+        // In nobody's possession, through a row of bodies.
+        boxes.push(Aabb::new([0.0, 0.4, 0.4], [20.0, 0.6, 0.6]));
+        let membership = |k: usize| Membership { owner: (k / parts + 1) as u32 % 65, ..Membership::ALL };
+        let memberships: Vec<Membership> = (0..boxes.len()).map(membership).collect();
+        let (rod, others) = boxes.split_last().unwrap();
+        let expected: Vec<_> = (0..others.len() as u32)
+            .filter(|&k| others[k as usize].overlaps(rod))
+            .map(|k| (k, others.len() as u32))
+            .collect();
+        let mut pairs = Pairs::with_order(PairOrder::Canonical);
+        pairs.set_filter(Some(Filter::new(memberships)));
+        for _ in 0..4 {
+            algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+            assert!(pairs.as_slice() == expected && !expected.is_empty(), "{id}: {} pairs", pairs.len());
+            assert!(!early || pairs.overlapping() == pairs.len() as u64, "{id}: {} found", pairs.overlapping());
+        }
+    }
+}
+
 #[test]
 fn fixed_boxes_have_no_pair_under_limit_0() {
     let boxes = [Aabb::cube([3.0; 3], 1.0); 2000];

@@ -239,3 +239,22 @@ fn too_many_pairs_to_keep_are_found() {
         assert_all_agree(&format!("frame {frame}"), &boxes, &mut algorithms);
     }
 }
+
+#[test]
+fn infinite_box_joins_kept_pairs() {
+    let mut boxes = Random(4).cubes(1000, [12.0; 3], 0.5);
+    let mut algorithms = every_algorithm();
+    let mut pairs = Pairs::with_order(PairOrder::Canonical);
+    for frame in 0..8 {
+        match frame {
+            5 => boxes.push(Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3])),
+            // Finds the infinite box, which must be in the tree.
+            6.. => boxes[frame] = Aabb::cube([frame as f32; 3], 0.5),
+            _ => {}
+        }
+        for (id, algorithm) in &mut algorithms {
+            algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+            assert!(pairs.as_slice() == naive(&boxes), "{id}, frame {frame}: {} pairs", pairs.len());
+        }
+    }
+}

@@ -96,8 +96,13 @@ mod tests {
                     (0..3).for_each(|a| (b.min[a], b.max[a]) = (b.min[a] + by, b.max[a] + by));
                 }),
             }
-            let filter = (frame % 40 > 12)
-                .then(|| Filter::new(fixed.iter().map(|&fixed| Membership { fixed, ..Membership::ALL }).collect()));
+            // Beside nothing, fixed boxes, owners, or groups.
+            let of = |(k, &fixed): (usize, &bool)| match frame / 40 {
+                0 => Membership { fixed, ..Membership::ALL },
+                1 => Membership { fixed, owner: (k % 5) as u32, ..Membership::ALL },
+                _ => Membership { groups: 1 << (k % 2), mask: 1 << u32::from(fixed), ..Membership::ALL },
+            };
+            let filter = (frame % 40 > 12).then(|| Filter::new(fixed.iter().enumerate().map(of).collect()));
             let mut invalid = boxes.clone();
             invalid[2].min[2] = f32::NAN;
             let expected = double_loop(&boxes, |pair| filter.as_ref().is_none_or(|f| f.wants(pair)));

@@ -160,7 +160,13 @@ impl Walk<'_> {
             #[cfg(target_arch = "x86_64")]
             Simd::Avx2(_) => unsafe { x86::group_avx2(self, &side, marks, pairs) },
             Simd::Portable => {
-                self.group_with_all(&side, Node::overlapping, |i, j, hits, to| write_each(i, j, hits, to), marks, pairs)
+                self.group_with_all(
+                    &side,
+                    Node::overlapping,
+                    |i, j, hits, to| write_each(i, j, hits, to),
+                    marks,
+                    pairs,
+                );
             }
         }
     }

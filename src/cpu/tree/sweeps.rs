@@ -219,8 +219,9 @@ mod tests {
             }
             // Half of the boxes are fixed, after a time others.
             let fixed = |k: u64| mix(k + frame / 18).is_multiple_of(2);
-            let filter = (frame % 18 > 8)
-                .then(|| Filter::new((0..18_000).map(|k| Membership { fixed: fixed(k), ..Membership::ALL }).collect()));
+            let owner = |k: u64| if frame < 18 { 0 } else { (k % 3) as u32 };
+            let of = |k| Membership { fixed: fixed(k), owner: owner(k), ..Membership::ALL };
+            let filter = (frame % 18 > 8).then(|| Filter::new((0..18_000).map(of).collect()));
             let mut expected = Pairs::new();
             expected.set_filter(filter.clone());
             oracle.find_pairs(&boxes, &mut expected).unwrap();
