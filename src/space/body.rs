@@ -48,6 +48,14 @@ impl Body {
         self
     }
 
+    /// Sets what the body is a part of, such as a ragdoll. Bodies with the same owner do not meet. The default is 0, which
+    /// is no owner.
+    #[must_use]
+    pub fn owner(mut self, owner: u32) -> Self {
+        self.membership.owner = owner;
+        self
+    }
+
     /// Sets a number of the caller's, which the space keeps.
     #[must_use]
     pub fn user_data(mut self, user_data: u64) -> Self {
@@ -66,7 +74,7 @@ impl Body {
         self.membership.fixed && !self.kinematic
     }
 
-    /// Returns the groups, the mask and whether the body is fixed or kinematic.
+    /// Returns the groups, the mask, the owner, and whether the body is fixed or kinematic.
     #[must_use]
     pub fn membership(&self) -> &Membership {
         &self.membership

@@ -32,7 +32,8 @@ impl Random {
     }
 
     fn body(&mut self) -> Body {
-        match self.next(8) {
+        match self.next(9) {
+            8 => Body::default().owner(1 + self.next(3) as u32),
             0 => Body::fixed(),
             1 => Body::kinematic(),
             2 => Body::default().groups(1 << self.next(3)).masks(self.next(8) as u32),
