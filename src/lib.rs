@@ -47,6 +47,7 @@ mod load;
 mod named;
 mod pair;
 mod pairs;
+mod ray;
 mod registry;
 #[cfg(test)]
 mod scene;

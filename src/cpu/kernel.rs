@@ -5,10 +5,14 @@
 
 pub(crate) mod bounds;
 pub(crate) mod contain;
+pub(crate) mod distance;
 pub(crate) mod marks;
+pub(crate) mod nearest_first;
 pub(crate) mod node;
 #[cfg(any(test, not(target_arch = "x86_64")))]
 mod portable;
+pub(crate) mod ray;
+mod sixteen;
 pub(crate) mod walk;
 #[cfg(target_arch = "x86_64")]
 mod x86;

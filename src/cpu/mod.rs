@@ -27,6 +27,7 @@ pub use level::{SimdLevel, SimdLevelError};
 pub(crate) use pair_cache::GrownTree;
 pub use threads::Threads;
 pub(crate) use tree::Members;
+pub use tree::{Near, Tree};
 pub use workers::Workers;
 
 use crate::broad_phase::BroadPhase;

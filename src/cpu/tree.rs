@@ -8,6 +8,7 @@
 mod codes;
 mod curve;
 mod order;
+mod queries;
 mod sweeps;
 mod upkeep;
 
@@ -18,7 +19,8 @@ use crate::cpu::kernel::marks::Marks;
 use crate::cpu::kernel::node::{Group, LANES, Node};
 use crate::cpu::kernel::prefetch;
 use crate::cpu::kernel::walk::Walk;
-use crate::cpu::level::Simd;
+use crate::cpu::level::{Simd, SimdLevel};
+use crate::cpu::threads::Threads;
 use crate::cpu::workers::Workers;
 use crate::error::Error;
 use crate::filter::{Membership, Screen};
@@ -29,6 +31,7 @@ use order::Order;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use sweeps::{Kind, Sweeps};
 
+pub use queries::Near;
 pub(crate) use upkeep::Upkeep;
 
 /// The id of an empty lane. No box has it: there are at most this many boxes.
@@ -52,7 +55,7 @@ const RENEWAL_PARTS: usize = 4;
 
 /// See the module.
 #[derive(Debug)]
-pub(crate) struct Tree {
+pub struct Tree {
     /// The box in each lane of the leaves, leaf after leaf.
     ids: Vec<u32>,
     /// Places in use, those of removed boxes included.
@@ -118,6 +121,17 @@ impl Tree {
             appended: Vec::new(),
             simd,
         }
+    }
+
+    /// Builds the tree of these boxes on one thread.
+    ///
+    /// # Errors
+    /// [`Error::InvalidBox`] for the first invalid box, and [`Error::OutOfMemory`].
+    pub fn of(boxes: &[Aabb]) -> Result<Self, Error> {
+        let mut tree = Self::new(Simd::at_most(SimdLevel::in_use()));
+        let workers = Workers::new("tree", 1, &Threads::default())?;
+        tree.build(&workers, boxes, Members::From(0), &SceneStats::of(boxes), None)?;
+        Ok(tree)
     }
 
     /// Reserves memory for a tree of this many boxes.
@@ -376,18 +390,6 @@ impl Tree {
     /// Adds the pairs of the boxes of a group with those in the tree. None of the group is in the tree.
     pub(crate) fn pairs_with(&self, group: &Group, pairs: &mut Pairs) {
         self.walk().pairs_with(self.simd, group, pairs);
-    }
-
-    /// Calls `found` for every box that overlaps these bounds, if a filter is tested only for those wanted `by` the box
-    /// with the bounds. Returns the number of visited nodes.
-    #[inline]
-    pub(crate) fn overlapping(
-        &self,
-        bounds: &Aabb,
-        by: impl FnOnce() -> Membership,
-        mut found: impl FnMut(u32),
-    ) -> u32 {
-        self.walk().each_overlapping(self.simd, bounds, by, |place| found(self.ids[place]))
     }
 
     fn walk(&self) -> Walk<'_> {

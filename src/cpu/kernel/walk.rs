@@ -55,7 +55,7 @@ pub(crate) struct Apart {
 pub(crate) const SAMPLE: usize = 32;
 
 /// Levels of a tree of 2^32 boxes.
-const MOST_LEVELS: usize = 9;
+pub(super) const MOST_LEVELS: usize = 9;
 
 /// All lanes of a level.
 const EVERY: Range<usize> = 0..usize::MAX;

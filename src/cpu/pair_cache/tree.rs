@@ -218,9 +218,9 @@ impl GrownTree {
         keys[first..end].iter().map(|&key| key as u32)
     }
 
-    /// See [`Tree::overlapping`].
+    /// See [`Tree::overlapping_wanted`].
     #[inline]
     pub(crate) fn overlapping(&self, bounds: &Aabb, by: impl FnOnce() -> Membership, found: impl FnMut(u32)) -> u32 {
-        self.tree.overlapping(bounds, by, found)
+        self.tree.overlapping_wanted(bounds, by, found)
     }
 }

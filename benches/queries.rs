@@ -1,0 +1,308 @@
+//! Queries of a tree beside those of parry3d and obvhs, on one thread: rays, first hit and all hits, and regions.
+//!
+//! Reports the CPU time of a query in nanoseconds: the median of interleaved rounds. First of all, every contestant
+//! must find the same.
+
+use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb as Bounds;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::builder::build_bvh2;
+use obvhs::cwbvh::CwBvh;
+use obvhs::cwbvh::builder::build_cwbvh;
+use obvhs::ray::{Ray as PeerRay, RayHit};
+// `traverse` names it.
+use glam::UVec2;
+use parry3d::bounding_volume::Aabb as ParryBounds;
+use parry3d::partitioning::{Bvh, BvhBuildStrategy};
+use parry3d::query::Ray as ParryRay;
+use rustix::time::{ClockId, clock_gettime};
+use sapwise::Aabb;
+use sapwise::internals::{Ray, Tree, splitmix};
+use sapwise_scenes::Scenario;
+use std::hint::black_box;
+use std::time::Duration;
+
+const BOXES: usize = 100_000;
+const QUERIES: usize = 10_000;
+const ROUNDS: usize = 25;
+
+/// Half the edge of a region, in edges of a box.
+const HALF: f32 = 1.5;
+
+/// Number and sum of what was found: ids, or the bits of the first `t` of each ray.
+type Found = (u64, u64);
+
+fn count(found: &mut Found, value: u32) {
+    found.0 += 1;
+    found.1 += u64::from(value);
+}
+
+trait Contestant {
+    fn name(&self) -> &'static str;
+    fn first_hits(&self, rays: &[Ray]) -> Found;
+    fn all_hits(&self, rays: &[Ray]) -> Found;
+    fn regions(&self, regions: &[Aabb]) -> Found;
+}
+
+impl Contestant for Tree {
+    fn name(&self) -> &'static str {
+        "sapwise"
+    }
+
+    fn first_hits(&self, rays: &[Ray]) -> Found {
+        let mut found = (0, 0);
+        for ray in rays {
+            let mut first = f32::INFINITY;
+            self.cast_ray(ray, |_, t| {
+                first = t;
+                t
+            });
+            if first < f32::INFINITY {
+                count(&mut found, first.to_bits());
+            }
+        }
+        found
+    }
+
+    fn all_hits(&self, rays: &[Ray]) -> Found {
+        let mut found = (0, 0);
+        for ray in rays {
+            self.cast_ray(ray, |id, _| {
+                count(&mut found, id);
+                f32::INFINITY
+            });
+        }
+        found
+    }
+
+    fn regions(&self, regions: &[Aabb]) -> Found {
+        let mut found = (0, 0);
+        for region in regions {
+            self.overlapping(region, |id| count(&mut found, id));
+        }
+        found
+    }
+}
+
+/// A tree of parry3d, and the boxes.
+struct Parry {
+    tree: Bvh,
+    bounds: Vec<Bounds>,
+}
+
+impl Contestant for Parry {
+    fn name(&self) -> &'static str {
+        "parry3d Bvh"
+    }
+
+    fn first_hits(&self, rays: &[Ray]) -> Found {
+        let mut found = (0, 0);
+        for ray in rays {
+            let peer = peer_ray(ray);
+            let to_box =
+                |id: u32, _| Some(self.bounds[id as usize].intersect_ray(&peer)).filter(|&t| t < f32::INFINITY);
+            let ray = ParryRay::new(ray.origin.into(), ray.direction.into());
+            if let Some((_, first)) = self.tree.cast_ray(&ray, f32::MAX, to_box) {
+                count(&mut found, first.max(0.0).to_bits());
+            }
+        }
+        found
+    }
+
+    fn all_hits(&self, rays: &[Ray]) -> Found {
+        let mut found = (0, 0);
+        for ray in rays {
+            let ray = peer_ray(ray);
+            let meets = |node: &parry3d::partitioning::BvhNode| {
+                Bounds::new(node.mins().to_array().into(), node.maxs().to_array().into()).intersect_ray(&ray)
+                    < f32::INFINITY
+            };
+            self.tree.leaves(meets).for_each(|id| count(&mut found, id));
+        }
+        found
+    }
+
+    fn regions(&self, regions: &[Aabb]) -> Found {
+        let mut found = (0, 0);
+        for region in regions {
+            let region = ParryBounds::new(region.min.into(), region.max.into());
+            self.tree.intersect_aabb(&region).for_each(|id| count(&mut found, id));
+        }
+        found
+    }
+}
+
+/// A tree of obvhs, and the boxes and their ids in the order of its leaves.
+struct Obvhs<T> {
+    name: &'static str,
+    tree: T,
+    bounds: Vec<Bounds>,
+    ids: Vec<u32>,
+}
+
+impl<T> Obvhs<T> {
+    fn new(name: &'static str, ids: &[u32], tree: T, bounds: &[Bounds]) -> Self {
+        Self { name, tree, bounds: ids.iter().map(|&id| bounds[id as usize]).collect(), ids: ids.to_vec() }
+    }
+}
+
+fn peer_ray(ray: &Ray) -> PeerRay {
+    PeerRay::new_inf(ray.origin.into(), ray.direction.into())
+}
+
+/// Both trees have these functions, without a common trait.
+macro_rules! rays {
+    () => {
+        fn name(&self) -> &'static str {
+            self.name
+        }
+
+        fn first_hits(&self, rays: &[Ray]) -> Found {
+            let mut found = (0, 0);
+            for ray in rays {
+                let mut hit = RayHit::none();
+                if self.tree.ray_traverse(peer_ray(ray), &mut hit, |ray, at| self.bounds[at].intersect_ray(ray)) {
+                    count(&mut found, hit.t.max(0.0).to_bits());
+                }
+            }
+            found
+        }
+
+        fn all_hits(&self, rays: &[Ray]) -> Found {
+            let mut found = (0, 0);
+            for ray in rays {
+                self.tree.ray_traverse_anyhit(peer_ray(ray), |ray, at| {
+                    if self.bounds[at].intersect_ray(ray) < f32::INFINITY {
+                        count(&mut found, self.ids[at]);
+                    }
+                });
+            }
+            found
+        }
+    };
+}
+
+impl Contestant for Obvhs<Bvh2> {
+    rays!();
+
+    fn regions(&self, regions: &[Aabb]) -> Found {
+        let mut found = (0, 0);
+        for region in regions {
+            let region = Bounds::new(region.min.into(), region.max.into());
+            self.tree.aabb_traverse(region, |tree, node| {
+                let node = &tree.nodes[node as usize];
+                for at in (node.first_index as usize..).take(node.prim_count as usize) {
+                    if region.intersect_aabb(&self.bounds[at]) {
+                        count(&mut found, self.ids[at]);
+                    }
+                }
+                true
+            });
+        }
+        found
+    }
+}
+
+impl Contestant for Obvhs<CwBvh> {
+    rays!();
+
+    fn regions(&self, regions: &[Aabb]) -> Found {
+        let mut found = (0, 0);
+        for region in regions {
+            let region = Bounds::new(region.min.into(), region.max.into());
+            let mut state = self.tree.new_traversal([0.0; 3].into());
+            let mut node;
+            obvhs::traverse!(self.tree, node, state, node.intersect_aabb(&region, state.oct_inv4), {
+                let at = state.primitive_id as usize;
+                if region.intersect_aabb(&self.bounds[at]) {
+                    count(&mut found, self.ids[at]);
+                }
+            });
+        }
+        found
+    }
+}
+
+fn contestants(boxes: &[Aabb]) -> Vec<Box<dyn Contestant>> {
+    let bounds: Vec<Bounds> = boxes.iter().map(|b| Bounds::new(b.min.into(), b.max.into())).collect();
+    let parry = boxes.iter().map(|b| ParryBounds::new(b.min.into(), b.max.into())).enumerate();
+    let parry = Parry { tree: Bvh::from_iter(BvhBuildStrategy::Binned, parry), bounds: bounds.clone() };
+    let mut taken = Duration::ZERO;
+    // The best trees of obvhs; those with one box a leaf too.
+    let best = BvhBuildParams::very_slow_build();
+    let few = build_bvh2(&bounds, best, &mut taken);
+    let one = build_bvh2(&bounds, BvhBuildParams { max_prims_per_leaf: 1, ..best }, &mut taken);
+    let wide = build_cwbvh(&bounds, best, &mut taken);
+    vec![
+        Box::new(Tree::of(boxes).expect("valid boxes")),
+        Box::new(parry),
+        Box::new(Obvhs::new("obvhs Bvh2, 8", &few.primitive_indices.clone(), few, &bounds)),
+        Box::new(Obvhs::new("obvhs Bvh2, 1", &one.primitive_indices.clone(), one, &bounds)),
+        Box::new(Obvhs::new("obvhs CwBvh", &wide.primitive_indices.clone(), wide, &bounds)),
+    ]
+}
+
+/// The CPU time of the process in nanoseconds.
+fn cpu_ns() -> f64 {
+    let time = clock_gettime(ClockId::ProcessCPUTime);
+    time.tv_sec as f64 * 1e9 + time.tv_nsec as f64
+}
+
+/// Prints the median of each contestant, and ours over the fastest of the peers.
+fn race(label: &str, contestants: &[Box<dyn Contestant>], run: &dyn Fn(&dyn Contestant) -> Found) {
+    let expected = run(&*contestants[0]);
+    for peer in &contestants[1..] {
+        assert_eq!(run(&**peer), expected, "{label}: {}", peer.name());
+    }
+    let mut taken = vec![Vec::new(); contestants.len()];
+    for round in 0..ROUNDS {
+        for k in 0..contestants.len() {
+            let at = (k + round) % contestants.len();
+            let begin = cpu_ns();
+            black_box(run(black_box(&*contestants[at])));
+            taken[at].push((cpu_ns() - begin) / QUERIES as f64);
+        }
+    }
+    let medians: Vec<f64> = taken
+        .iter_mut()
+        .map(|times| {
+            times.sort_by(f64::total_cmp);
+            times[ROUNDS / 2]
+        })
+        .collect();
+    let fastest = medians[1..].iter().copied().fold(f64::INFINITY, f64::min);
+    print!("{label}, {:.2} found a query:", expected.0 as f64 / QUERIES as f64);
+    contestants.iter().zip(&medians).for_each(|(c, ns)| print!(" {} {ns:.0} ns,", c.name()));
+    println!(" {:.2} × the fastest peer", fastest / medians[0]);
+}
+
+fn main() {
+    for scenario in [Scenario::Uniform, Scenario::Clustered] {
+        let scene = scenario.start(BOXES, 1);
+        let boxes = scene.boxes();
+        let contestants = contestants(boxes);
+        let mut state = 1;
+        let mut unit = || (splitmix::next(&mut state) >> 40) as f32 / (1 << 24) as f32;
+        let low = boxes.iter().fold([f32::INFINITY; 3], |low, b| [0, 1, 2].map(|a| low[a].min(b.min[a])));
+        let high = boxes.iter().fold([f32::NEG_INFINITY; 3], |high, b| [0, 1, 2].map(|a| high[a].max(b.max[a])));
+        let rays: Vec<Ray> = (0..QUERIES)
+            .map(|_| {
+                let origin = [0, 1, 2].map(|a| low[a] + unit() * (high[a] - low[a]));
+                // Evenly over the sphere.
+                let direction = loop {
+                    let v = [0; 3].map(|_| 2.0 * unit() - 1.0);
+                    let square: f32 = v.iter().map(|v| v * v).sum();
+                    if (0.01..1.0).contains(&square) {
+                        break v.map(|v| v / square.sqrt());
+                    }
+                };
+                Ray::new(origin, direction)
+            })
+            .collect();
+        let regions: Vec<Aabb> =
+            (0..QUERIES).map(|_| Aabb::cube(boxes[(unit() * BOXES as f32) as usize].min, HALF)).collect();
+        race(&format!("{scenario}, first hit"), &contestants, &|c| c.first_hits(&rays));
+        race(&format!("{scenario}, all hits"), &contestants, &|c| c.all_hits(&rays));
+        race(&format!("{scenario}, regions"), &contestants, &|c| c.regions(&regions));
+    }
+}

@@ -1,0 +1,136 @@
+//! Walks through a tree from near to far.
+
+use super::node::{LANES, Node};
+use super::prefetch;
+use super::sixteen::Sixteen;
+use super::walk::{MOST_LEVELS, Walk};
+use crate::cpu::level::Simd;
+use crate::pairs::each_bit;
+#[cfg(target_arch = "x86_64")]
+use std::arch::x86_64::{__m256, __m512};
+
+/// What near and far mean. A lane that contains another has no larger measure.
+pub(crate) trait Measure: Copy {
+    /// Writes the measure of each lane, at least 0, to `to`. Returns a mask: bit k is set if lane k holds a box with a
+    /// measure of at most `most`. The measures of the other lanes are unspecified.
+    ///
+    /// # Safety
+    /// The caller has the instructions of `V` enabled.
+    unsafe fn measure<V: Sixteen>(&self, node: &Node, most: f32, to: &mut [f32; LANES]) -> u32;
+}
+
+/// Children that are left to visit.
+#[derive(Clone, Copy)]
+struct Open {
+    node: usize,
+    left: u32,
+    measures: [f32; LANES],
+}
+
+impl Open {
+    const NONE: Self = Self { node: 0, left: 0, measures: [0.0; LANES] };
+
+    /// Takes the nearest child of all. Returns its lane and its measure.
+    #[inline(always)]
+    fn take_nearest(&mut self) -> Option<(usize, f32)> {
+        // The bits of measures, which are not negative, are ordered as these. Integers are compared without a branch,
+        // which would often be guessed wrong.
+        let mut nearest = u64::MAX;
+        each_bit(self.left, |lane| {
+            nearest = nearest.min(u64::from(self.measures[lane % LANES].to_bits()) << 32 | lane as u64);
+        });
+        let lane = nearest as usize % LANES;
+        let taken = (self.left != 0).then_some((lane, f32::from_bits((nearest >> 32) as u32)));
+        self.left &= !(1 << lane);
+        taken
+    }
+}
+
+impl Walk<'_> {
+    /// Calls `found` for every place in the leaves with a measure of at most `most`, which is the least of its first
+    /// value and those that `found` returned. Of the nodes below another, the nearest is visited first.
+    #[inline]
+    pub(crate) fn nearest_first(
+        &self,
+        simd: Simd,
+        measure: impl Measure,
+        most: f32,
+        found: impl FnMut(usize, f32) -> f32,
+    ) {
+        match simd {
+            // SAFETY: the proof says that this CPU has the instructions.
+            #[cfg(target_arch = "x86_64")]
+            Simd::Avx512(_) => unsafe { nearest_first_avx512(self, measure, most, found) },
+            // SAFETY: as above.
+            #[cfg(target_arch = "x86_64")]
+            Simd::Avx2(_) => unsafe { nearest_first_avx2(self, measure, most, found) },
+            // SAFETY: every CPU has the instructions of the baseline.
+            Simd::Portable => unsafe { self.nearest_first_by::<[f32; LANES]>(measure, most, found) },
+        }
+    }
+
+    /// # Safety
+    /// The caller has the instructions of `V` enabled.
+    #[inline(always)]
+    unsafe fn nearest_first_by<V: Sixteen>(
+        &self,
+        measure: impl Measure,
+        mut most: f32,
+        mut found: impl FnMut(usize, f32) -> f32,
+    ) {
+        let Some(top) = self.levels.iter().rposition(|level| !level.is_empty()) else { return };
+        // SAFETY: the caller has the instructions of `V` enabled.
+        let measure = |node: &Node, most, to: &mut [f32; LANES]| unsafe { measure.measure::<V>(node, most, to) };
+        // The nodes of the top have no parent: each 16 of them count as the children of one.
+        let mut open = [Open::NONE; MOST_LEVELS + 1];
+        for (node, roots) in self.levels[top].chunks(LANES).enumerate() {
+            open[top + 1] = Open { node, ..Open::NONE };
+            for (k, root) in roots.iter().enumerate() {
+                let mut lanes = [0.0; LANES];
+                let mut nearest = f32::INFINITY;
+                each_bit(measure(root, most, &mut lanes), |lane| {
+                    open[top + 1].left |= 1 << k;
+                    nearest = nearest.min(lanes[lane]);
+                });
+                open[top + 1].measures[k] = nearest;
+            }
+            let mut at = top + 1;
+            while at <= top + 1 {
+                let Some((lane, _)) = open[at].take_nearest().filter(|&(_, nearest)| nearest <= most) else {
+                    at += 1;
+                    continue;
+                };
+                let child = open[at].node * LANES + lane;
+                at -= 1;
+                let below = &mut open[at];
+                below.node = child;
+                below.left = measure(&self.levels[at][child], most, &mut below.measures);
+                if at == 0 {
+                    each_bit(below.left, |lane| {
+                        if below.measures[lane] <= most {
+                            most = most.min(found(child * LANES + lane, below.measures[lane]));
+                        }
+                    });
+                    at = 1;
+                } else if self.far {
+                    let (left, level) = (below.left, &self.levels[at - 1]);
+                    each_bit(left, |lane| level.get(child * LANES + lane).into_iter().for_each(prefetch));
+                }
+            }
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f")]
+fn nearest_first_avx512(walk: &Walk<'_>, measure: impl Measure, most: f32, found: impl FnMut(usize, f32) -> f32) {
+    // SAFETY: the instructions are enabled here.
+    unsafe { walk.nearest_first_by::<[__m512; 1]>(measure, most, found) };
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn nearest_first_avx2(walk: &Walk<'_>, measure: impl Measure, most: f32, found: impl FnMut(usize, f32) -> f32) {
+    // SAFETY: the instructions are enabled here.
+    unsafe { walk.nearest_first_by::<[__m256; 2]>(measure, most, found) };
+}

@@ -1,0 +1,125 @@
+//! Queries of a tree: by a region, along a ray or the way of a moved box, and of what is nearest to a point.
+//!
+//! Any number of threads may query a tree at once. A box of the tree is found once.
+
+use super::Tree;
+use crate::aabb::Aabb;
+use crate::cpu::kernel::distance::Distance;
+use crate::cpu::kernel::ray::Cast;
+use crate::filter::Membership;
+use crate::ray::Ray;
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+/// A box near a point. The nearest is the least; of two at the same distance it is the one with the lower id.
+#[derive(Debug, Clone, Copy)]
+pub struct Near {
+    /// The distance from the point to the box, 0 inside.
+    pub distance: f32,
+    /// The position of the box in the input.
+    pub id: u32,
+}
+
+impl Ord for Near {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.distance.total_cmp(&other.distance).then(self.id.cmp(&other.id))
+    }
+}
+
+impl PartialOrd for Near {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Near {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Near {}
+
+impl Tree {
+    /// Calls `found` for every box that overlaps these bounds. Returns the number of visited nodes.
+    #[inline]
+    pub fn overlapping(&self, bounds: &Aabb, found: impl FnMut(u32)) -> u32 {
+        self.overlapping_wanted(bounds, || Membership::ALL, found)
+    }
+
+    /// Does the same, but leaves out boxes that are unwanted `by` the box with the bounds, if the tree was built with a
+    /// filter.
+    #[inline]
+    pub(crate) fn overlapping_wanted(
+        &self,
+        bounds: &Aabb,
+        by: impl FnOnce() -> Membership,
+        mut found: impl FnMut(u32),
+    ) -> u32 {
+        self.walk().each_overlapping(self.simd, bounds, by, |place| found(self.ids[place]))
+    }
+
+    /// Calls `found` with the id of every box that a valid ray meets, and the `t` at which it enters the box: 0 if it
+    /// begins there. Boxes are closed: a ray meets a box that it touches, and one in whose face it lies.
+    ///
+    /// `found` returns how far the search goes on: never beyond [`Ray::max`] or a value that it returned before. If it
+    /// returns the given `t`, no farther box follows, and the last one is the first hit. If it returns infinity, all
+    /// boxes follow; if a negative number, none. Nearer nodes come first, but not every nearer box.
+    ///
+    /// On each axis, the times of entry and exit are `(bound - origin) × (1 / direction)` in `f32`; the box is met if
+    /// no entry is later than an exit. Boxes that are only reached beyond [`f32::MAX`] are not met.
+    #[inline]
+    pub fn cast_ray(&self, ray: &Ray, found: impl FnMut(u32, f32) -> f32) {
+        self.cast_box(&Aabb::new(ray.origin, ray.origin), ray.direction, ray.max, found);
+    }
+
+    /// Calls `found` with the id of every box that a valid box meets when it moves by `t × motion`, and the least such
+    /// `t` from 0 to `max`: 0 for boxes that it [overlaps](Aabb::overlaps) at the start. All else is as for
+    /// [`cast_ray`](Self::cast_ray), with the origin zero and the bounds `min - b.max` and `max - b.min` of the met
+    /// box. Components of `motion` must be finite, and may all be zero.
+    #[inline]
+    pub fn cast_box(&self, b: &Aabb, motion: [f32; 3], max: f32, mut found: impl FnMut(u32, f32) -> f32) {
+        let found = |place: usize, t| found(self.ids[place], t);
+        self.walk().nearest_first(self.simd, Cast::new(b, motion), max.min(f32::MAX), found);
+    }
+
+    /// Writes the `k` boxes nearest to a point to `nearest`, ascending: of those that are `wanted`, at a distance of at
+    /// most `max_distance`. Coordinates of the point must be finite. Fewer boxes are written if there are fewer.
+    ///
+    /// Distances are rounded: the root of the sum of squares in `f32`. Allocates only if `nearest` has no capacity for
+    /// `k` boxes.
+    #[inline]
+    pub fn nearest(
+        &self,
+        point: [f32; 3],
+        k: usize,
+        max_distance: f32,
+        wanted: impl Fn(u32) -> bool,
+        nearest: &mut Vec<Near>,
+    ) {
+        nearest.clear();
+        if k == 0 {
+            return;
+        }
+        // The farthest is on top.
+        let mut heap = BinaryHeap::from(std::mem::take(nearest));
+        self.walk().nearest_first(self.simd, Distance(point), max_distance, |place, distance| {
+            let near = Near { distance, id: self.ids[place] };
+            if heap.len() < k {
+                if wanted(near.id) {
+                    heap.push(near);
+                }
+            } else if let Some(mut farthest) = heap.peek_mut()
+                && near < *farthest
+                && wanted(near.id)
+            {
+                *farthest = near;
+            }
+            if heap.len() < k { max_distance } else { heap.peek().map_or(max_distance, |farthest| farthest.distance) }
+        });
+        *nearest = heap.into_sorted_vec();
+    }
+}
+
+#[cfg(test)]
+mod tests;
