@@ -9,6 +9,7 @@ use std::fmt;
 pub use crate::algorithm::ParseIdError;
 pub use crate::cost::CurveError;
 pub use crate::named::UnknownName;
+pub use crate::ray::RayDefect;
 pub use crate::tuning::TuningError;
 pub use gpu::{GpuError, GpuErrorKind};
 
@@ -51,6 +52,11 @@ pub enum Error {
         handle: Handle,
         /// What is wrong with its box.
         defect: BoxDefect,
+    },
+    /// A ray, a motion or a point that can't be searched along or from.
+    InvalidRay {
+        /// What is wrong with it.
+        defect: RayDefect,
     },
     /// An allocation was refused.
     OutOfMemory {
@@ -212,6 +218,7 @@ impl fmt::Display for Error {
             Error::InvalidBody { handle, defect } => {
                 write!(f, "the box for body {handle} {defect}; the body keeps its previous box")
             }
+            Error::InvalidRay { defect } => write!(f, "the ray {defect}; correct it or leave the query out"),
             Error::OutOfMemory { what, elements } => {
                 write!(f, "no memory for {elements} {what}; set a limit on the pairs or use fewer boxes")
             }

@@ -66,11 +66,12 @@ pub use changes::Changes;
 pub use error::Error;
 pub use filter::{Filter, Membership};
 pub use pairs::{PairOrder, Pairs};
+pub use ray::Ray;
 /// The version of rayon whose pools [`Registry::use_pool`] takes. The number is part of the name, because another
 /// version has other types: a release of this library that takes a newer rayon is a breaking one, and exports it under
 /// a new name.
 #[cfg(feature = "parallel")]
 pub use rayon as rayon1;
 pub use registry::Registry;
-pub use space::{Body, Handle, Space};
+pub use space::{Body, Handle, Space, View};
 pub use tuning::Tuning;

@@ -15,9 +15,11 @@ mod slots;
 #[cfg(test)]
 mod tests;
 mod update;
+mod view;
 
 use crate::aabb::Aabb;
 use crate::adaptive::Adaptive;
+use crate::cpu::Tree;
 use crate::error::Error;
 use crate::pairs::Sorter;
 use crate::registry::Registry;
@@ -27,9 +29,11 @@ use links::Links;
 use near::Neighbours;
 use resting::Resting;
 use slots::Slots;
+use std::sync::OnceLock;
 
 pub use body::Body;
 pub use handle::Handle;
+pub use view::View;
 
 /// Updates without being set after which a body may rest. Waking it costs about as much as that many updates of an
 /// active one.
@@ -75,6 +79,8 @@ pub struct Space {
     active: Active,
     resting: Resting,
     neighbours: Neighbours,
+    /// Of the active bodies, from the first query after an update on.
+    tree: OnceLock<Tree>,
     /// Of the first pairs in `pairs`.
     links: Links,
     /// Number of updates.
@@ -118,6 +124,7 @@ impl Space {
             active: Active::default(),
             resting: Resting::new(),
             neighbours: Neighbours::default(),
+            tree: OnceLock::new(),
             links: Links::default(),
             update: 0,
             rests: false,

@@ -97,6 +97,11 @@ impl Slots {
         self.slots[slot as usize].at = at;
     }
 
+    /// Returns whether there is a body in a slot.
+    pub(super) fn is_taken(&self, slot: u32) -> bool {
+        self.slots[slot as usize].is_taken()
+    }
+
     pub(super) fn is_changed(&self, slot: u32) -> bool {
         self.slots[slot as usize].done != 0
     }

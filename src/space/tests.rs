@@ -1,6 +1,7 @@
 use super::*;
 use crate::algorithm::AlgorithmId;
 use crate::error::BoxDefect;
+use crate::ray::Ray;
 use crate::splitmix::mix;
 use std::collections::BTreeSet;
 
@@ -69,6 +70,61 @@ fn check(space: &mut Space, before: &mut Set, what: &str) {
     *before = expected;
 }
 
+/// Compares queries with what a loop over all bodies finds.
+fn check_queries(space: &Space, random: &mut Random, what: &str) {
+    let by = random.body();
+    let all: Vec<(Handle, Aabb, Body)> =
+        space.handles().map(|h| (h, space.get(h).unwrap())).map(|(h, (b, body))| (h, *b, *body)).collect();
+    for view in [None, Some(by)] {
+        let wanted = |body: &Body| view.is_none_or(|by| by.membership().wants(body.membership()));
+        let expected = |meets: &dyn Fn(&Aabb) -> bool| -> Vec<Handle> {
+            all.iter().filter(|(_, b, body)| meets(b) && wanted(body)).map(|&(handle, ..)| handle).collect()
+        };
+        let of = |space| View::of(space, view.as_ref());
+        let region = random.aabb(9.0);
+        let mut found = Vec::new();
+        of(space).query_box(&region, |handle| found.push(handle)).unwrap();
+        found.sort();
+        assert_eq!(found, expected(&|b| b.overlaps(&region)), "{what}: region");
+        let point = [0; 3].map(|_| random.unit() * 9.0);
+        found.clear();
+        of(space).query_point(point, |handle| found.push(handle)).unwrap();
+        found.sort();
+        assert_eq!(found, expected(&|b| b.overlaps(&Aabb::new(point, point))), "{what}: point");
+        // Along an axis the swept box is exact.
+        let length = random.unit() * 9.0;
+        let end = [point[0] + length, point[1], point[2]];
+        let ray = Ray { max: 1.0, ..Ray::new(point, [length, 0.0, 0.0]) };
+        found.clear();
+        of(space)
+            .cast_ray(&ray, |handle, _| {
+                found.push(handle);
+                f32::INFINITY
+            })
+            .unwrap();
+        found.sort();
+        let met = expected(&|b| b.overlaps(&Aabb::new(point, end)));
+        assert!(found.iter().zip(&met).filter(|(a, b)| a == b).count() + 1 >= met.len(), "{what}: ray");
+        let mut first = None;
+        for &handle in &found {
+            let low = (space.get(handle).unwrap().0.min[0] - point[0]) * (1.0 / length);
+            let t = low.max(0.0);
+            first = first.filter(|&(_, least)| least <= t).or(Some((handle, t)));
+        }
+        assert_eq!(of(space).first_hit(&ray).unwrap(), first, "{what}: first hit");
+        let distance = |b: &Aabb| {
+            let away = [0, 1, 2].map(|a| (b.min[a] - point[a]).max(point[a] - b.max[a]).max(0.0));
+            away.iter().map(|v| v * v).sum::<f32>().sqrt()
+        };
+        let mut near: Vec<(Handle, f32)> =
+            all.iter().filter(|(_, _, body)| wanted(body)).map(|(h, b, _)| (*h, distance(b))).collect();
+        near.sort_by(|(a, one), (b, other)| one.total_cmp(other).then(a.cmp(b)));
+        near.truncate(5);
+        let found = of(space).nearest(point, 5).unwrap();
+        assert_eq!(found.iter().map(|n| n.1).collect::<Vec<_>>(), near.iter().map(|n| n.1).collect::<Vec<_>>());
+    }
+}
+
 /// Inserts, sets and removes at random; at times most bodies rest, and at times all wake.
 fn random_calls(space: &mut Space, seed: u64, mut look: impl FnMut(&mut Space, usize)) -> [bool; 2] {
     let mut random = Random(seed << 32);
@@ -118,8 +174,12 @@ fn only(algorithm: &str) -> Space {
 fn random_calls_give_the_pairs_of_a_double_loop() {
     for seed in 0..6 {
         let (mut space, mut before) = (Space::new(), Set::new());
-        let rested =
-            random_calls(&mut space, seed, |space, frame| check(space, &mut before, &format!("{seed}, {frame}")));
+        let mut random = Random(1000 + seed);
+        let rested = random_calls(&mut space, seed, |space, frame| {
+            let what = format!("seed {seed}, frame {frame}");
+            check(space, &mut before, &what);
+            check_queries(space, &mut random, &what);
+        });
         assert_eq!(rested, [true; 2]);
     }
 }
@@ -204,4 +264,57 @@ fn call_that_fails_changes_nothing() {
     assert_eq!((Handle::from_bits(0), size_of::<Option<Handle>>()), (None, 8));
     let foreign = Handle::from_bits(u64::MAX).unwrap();
     assert_eq!(space.remove(foreign), Err(Error::StaleHandle { handle: foreign }));
+}
+
+#[test]
+fn queries_leave_out_what_was_removed_since_and_report_bad_input() {
+    let mut space = Space::new();
+    let handles = space.insert_all(&[Aabb::cube([0.0; 3], 1.0), Aabb::cube([1.0; 3], 1.0)], Body::default()).unwrap();
+    space.update().unwrap();
+    let at = |space: &Space| {
+        let mut found = Vec::new();
+        space.query_point([0.5; 3], |handle| found.push(handle)).unwrap();
+        found
+    };
+    assert_eq!(at(&space), handles);
+    space.remove(handles[0]).unwrap();
+    // Where it was at the last update.
+    space.set(handles[1], Aabb::cube([9.0; 3], 1.0)).unwrap();
+    assert_eq!(at(&space), handles[1..]);
+    space.update().unwrap();
+    assert_eq!(at(&space), []);
+    let nan = [f32::NAN, 0.0, 0.0];
+    assert!(matches!(space.nearest(nan, 1), Err(Error::InvalidRay { .. })));
+    assert!(matches!(space.query_point(nan, drop), Err(Error::InvalidBox { index: 0, .. })));
+    assert!(matches!(space.first_hit(&Ray::new([0.0; 3], [0.0; 3])), Err(Error::InvalidRay { .. })));
+    let unit = Aabb::cube([9.0; 3], 0.5);
+    assert!(matches!(space.cast_box(&unit, nan, |_, t| t), Err(Error::InvalidRay { .. })));
+    let mut met = 0;
+    space
+        .cast_box(&unit, [0.0; 3], |_, t| {
+            met += 1;
+            t
+        })
+        .unwrap();
+    assert_eq!(met, 1);
+    assert_eq!(Space::new().nearest([0.0; 3], 3), Ok(vec![]));
+}
+
+#[test]
+fn threads_may_query_at_once() {
+    let mut space = Space::new();
+    let boxes: Vec<Aabb> = (0..500).map(|k| Aabb::cube([k as f32, 0.0, 0.0], 0.4)).collect();
+    let handles = space.insert_all(&boxes, Body::default()).unwrap();
+    space.update().unwrap();
+    let (space, handles) = (&space, &handles);
+    std::thread::scope(|scope| {
+        for start in 0..4 {
+            scope.spawn(move || {
+                for k in (start..500).step_by(4) {
+                    let ray = Ray::new([k as f32, 5.0, 0.0], [0.0, -1.0, 0.0]);
+                    assert_eq!(space.first_hit(&ray), Ok(Some((handles[k], 4.6))));
+                }
+            });
+        }
+    });
 }

@@ -21,6 +21,7 @@ impl Space {
     /// Does an update.
     pub(super) fn run(&mut self) -> Result<(), Error> {
         self.update += 1;
+        self.tree.take();
         self.pairs.truncate(self.links.len());
         self.begun.clear();
         self.ended.clear();

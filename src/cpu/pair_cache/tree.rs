@@ -119,6 +119,11 @@ impl GrownTree {
         &mut self.tree
     }
 
+    /// Returns the tree for queries.
+    pub(crate) fn inner(&self) -> &Tree {
+        &self.tree
+    }
+
     /// Adds part `k` of `parts` of the pairs of all boxes that were in the tree when it was built.
     pub(crate) fn self_pairs(&self, k: usize, parts: usize, pairs: &mut Pairs) {
         self.tree.self_pairs(k, parts, pairs);
