@@ -100,6 +100,45 @@ pub struct Space {
     ended: Vec<(Handle, Handle)>,
 }
 
+/// A clone goes on as the original would: the same calls give the same lists. It searches with the built-in algorithms
+/// on the CPU, by the same tuning. `clone_from` keeps what searches, as a game that goes back to an earlier state wants:
+///
+/// ```
+/// use sapwise::{Aabb, Body, Space};
+///
+/// let mut space = Space::new();
+/// let body = space.insert(Aabb::cube([0.0; 3], 1.0), Body::default())?;
+/// space.update()?;
+/// let saved = space.clone();
+/// space.remove(body)?;
+/// space.update()?;
+/// space.clone_from(&saved);
+/// assert!(space.contains(body));
+/// # Ok::<(), sapwise::Error>(())
+/// ```
+impl Clone for Space {
+    fn clone(&self) -> Self {
+        let twin = Adaptive::new(self.search.tuning().clone(), &Registry::new());
+        let mut clone = twin.map_or_else(|_| Self::new(), Self::with);
+        clone.clone_from(self);
+        clone
+    }
+
+    fn clone_from(&mut self, other: &Self) {
+        self.slots.clone_from(&other.slots);
+        self.active.clone_from(&other.active);
+        self.links.clone_from(&other.links);
+        (self.update, self.rests) = (other.update, other.rests);
+        self.before.clone_from(&other.before);
+        self.pairs.clone_from(&other.pairs);
+        self.begun.clone_from(&other.begun);
+        self.ended.clone_from(&other.ended);
+        self.neighbours.clear();
+        self.tree.take();
+        self.resting.begin(&self.slots);
+    }
+}
+
 impl Default for Space {
     fn default() -> Self {
         Self::new()

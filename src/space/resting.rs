@@ -1,6 +1,6 @@
 //! The bodies that were not set for some updates: a tree of them, and the pairs among them.
 
-use super::slots::{At, Slots};
+use super::slots::Slots;
 use crate::aabb::Aabb;
 use crate::cpu::{GrownTree, Members, Simd, SimdLevel, Tree, Workers};
 use crate::error::Error;
@@ -78,6 +78,14 @@ impl Resting {
         (self.len, self.is_built) = (0, false);
     }
 
+    /// Holds the resting ones of other bodies than before.
+    pub(super) fn begin(&mut self, slots: &Slots) {
+        self.clear();
+        self.len = slots.resting().count();
+        // Without memory for the tree, the next update reports the error.
+        let _ = self.update(slots);
+    }
+
     /// Puts the arrivals into the tree.
     pub(super) fn update(&mut self, slots: &Slots) -> Result<(), Error> {
         let boxes = slots.boxes();
@@ -85,7 +93,7 @@ impl Resting {
         if self.arrivals.is_empty() && !worn && self.is_built || self.len() == 0 {
             return Ok(());
         }
-        if !self.arrivals.is_empty() {
+        if !self.arrivals.is_empty() || !self.is_built {
             self.epoch += 1;
         }
         let many = self.arrivals.len() > self.len / 4;
@@ -96,7 +104,7 @@ impl Resting {
         let is_built = std::mem::take(&mut self.is_built);
         if many || worn || !is_built || self.tree.is_sparse(self.len) {
             self.members.clear();
-            self.members.extend((0..boxes.len() as u32).filter(|&slot| slots.at(slot) == At::Resting));
+            self.members.extend(slots.resting());
             let stats = SceneStats::of_members(boxes, &self.members);
             (self.fresh, self.excess) = ([0; 2], 0);
             self.tree.build(&self.workers, boxes, Members::Of(&self.members), &stats, None)?;

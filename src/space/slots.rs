@@ -186,6 +186,11 @@ impl Slots {
         }
     }
 
+    /// Returns the slots of resting bodies, ascending.
+    pub(super) fn resting(&self) -> impl Iterator<Item = u32> {
+        (0..).zip(&self.slots).filter(|(_, of)| of.at == At::Resting).map(|(slot, _)| slot)
+    }
+
     /// Returns the handles of all bodies, by slot.
     pub(super) fn handles(&self) -> impl Iterator<Item = Handle> {
         let taken = |(_, of): &(u32, &Slot)| of.is_taken();

@@ -175,10 +175,22 @@ fn random_calls_give_the_pairs_of_a_double_loop() {
     for seed in 0..6 {
         let (mut space, mut before) = (Space::new(), Set::new());
         let mut random = Random(1000 + seed);
+        let (mut twin, mut saved) = (Space::new(), Space::new());
         let rested = random_calls(&mut space, seed, |space, frame| {
             let what = format!("seed {seed}, frame {frame}");
+            if frame % 7 == 3 {
+                twin.clone_from(space);
+            }
             check(space, &mut before, &what);
             check_queries(space, &mut random, &what);
+            if frame % 7 == 3 {
+                twin.update().unwrap();
+                let lists = |space: &Space| [space.pairs(), space.begun(), space.ended()].map(<[_]>::to_vec);
+                assert!(lists(&twin) == lists(space), "{what}: clone");
+                check_queries(&twin, &mut random, &what);
+                saved.clone_from(space);
+                check_queries(&saved, &mut random, &what);
+            }
         });
         assert_eq!(rested, [true; 2]);
     }
