@@ -1,0 +1,213 @@
+//! `Space` beside the slice interface, and beside a space without the bodies that should cost nothing. One thread.
+//!
+//! Reports the median and the slowest hundredth of all updates after a warm-up, setting of the boxes included. Both
+//! sides of a row take turns in each frame.
+
+use sapwise::{Aabb, Adaptive, Body, BroadPhase, Changes, Filter, Handle, Membership, Pairs, Registry, Space, Tuning};
+use sapwise_scenes::{Random, Scenario};
+use std::time::Instant;
+
+/// Frames before the first that counts: bodies rest by then, and margins have settled.
+const WARM_UP: usize = 100;
+
+fn adaptive() -> Adaptive {
+    let registry = Registry::with_cores(1);
+    Adaptive::new(Tuning::usual(&registry), &registry).expect("the usual tuning has algorithms on one thread")
+}
+
+/// The times of the updates of one side, in microseconds.
+#[derive(Default)]
+struct Times(Vec<f64>);
+
+impl Times {
+    fn add(&mut self, frame: usize, work: impl FnOnce()) {
+        let started = Instant::now();
+        work();
+        if frame >= WARM_UP {
+            self.0.push(started.elapsed().as_nanos() as f64 / 1000.0);
+        }
+    }
+
+    /// Returns the median and the 99th percentile.
+    fn quantiles(&mut self) -> [f64; 2] {
+        self.0.sort_by(f64::total_cmp);
+        [0.5, 0.99].map(|q| self.0[((self.0.len() - 1) as f64 * q) as usize])
+    }
+}
+
+fn row(name: &str, mut space: Times, other: Option<Times>) {
+    let [median, slow] = space.quantiles();
+    print!("| {name} | {} | {median:.1} | {slow:.1} |", space.0.len());
+    match other.map(|mut other| other.quantiles()) {
+        Some([other, _]) => println!(" {other:.1} | {:.2} |", median / other),
+        None => println!(" | |"),
+    }
+}
+
+/// Frames for a scene of this size: about as long for each.
+fn frames(objects: usize) -> usize {
+    WARM_UP + (2_000_000 / objects).clamp(60, 2000)
+}
+
+/// All bodies move; the slice interface with filter, ids and events does the same.
+fn all_moving(scenario: Scenario, objects: usize) {
+    let mut scene = scenario.start(objects, 1);
+    let mut space = Space::with(adaptive());
+    let handles = space.insert_all(scene.boxes(), Body::default().groups(1)).expect("valid boxes");
+    let (mut search, mut pairs, mut changes) = (adaptive(), Pairs::new(), Changes::new());
+    let membership = Membership { groups: 1, ..Membership::ALL };
+    pairs.set_filter(Some(Filter::new(vec![membership; objects])));
+    let ids: Vec<u64> = handles.iter().map(|handle| handle.to_bits()).collect();
+    let mut boxes = scene.boxes().to_vec();
+    let (mut one, mut other) = (Times::default(), Times::default());
+    for frame in 0..frames(objects) {
+        scene.advance();
+        for turn in 0..2 {
+            if (turn + frame) % 2 == 0 {
+                one.add(frame, || {
+                    space.set_all(&handles, scene.boxes()).expect("valid boxes");
+                    space.update().expect("an update");
+                });
+            } else {
+                other.add(frame, || {
+                    boxes.copy_from_slice(scene.boxes());
+                    search.find_pairs(&boxes, &mut pairs).expect("a frame");
+                    changes.update(&pairs, &ids).expect("an id for each box");
+                });
+            }
+        }
+        assert_eq!((space.pairs().len(), space.begun().len()), (pairs.len(), changes.begun().len()));
+    }
+    row(&format!("{scenario} {objects}: slice interface"), one, Some(other));
+}
+
+/// A few of many bodies are set; in the other space there are no others.
+fn few_of_many(objects: usize, set: usize) {
+    let mut scene = Scenario::Uniform.start(objects, 1);
+    let (mut many, mut few) = (Space::with(adaptive()), Space::with(adaptive()));
+    let handles = many.insert_all(scene.boxes(), Body::default()).expect("valid boxes");
+    let alone = few.insert_all(&scene.boxes()[..set], Body::default()).expect("valid boxes");
+    let stored: Vec<Vec<Aabb>> = (0..256)
+        .map(|_| {
+            scene.advance();
+            scene.boxes()[..set].to_vec()
+        })
+        .collect();
+    let (mut one, mut other) = (Times::default(), Times::default());
+    for frame in 0..WARM_UP + 2000 {
+        // To and fro, so that no box jumps.
+        let at = frame % 510;
+        let boxes = &stored[if at < 256 { at } else { 510 - at }];
+        one.add(frame, || {
+            many.set_all(&handles[..set], boxes).expect("valid boxes");
+            many.update().expect("an update");
+        });
+        other.add(frame, || {
+            few.set_all(&alone, boxes).expect("valid boxes");
+            few.update().expect("an update");
+        });
+    }
+    row(&format!("{set} of {objects} set: those alone"), one, Some(other));
+}
+
+/// Some of many resting bodies are removed, and as many inserted in their place.
+fn replaced(objects: usize, some: usize) {
+    let scene = Scenario::Resting.start(objects, 1);
+    let mut space = Space::with(adaptive());
+    let mut handles: Vec<Handle> = space.insert_all(scene.boxes(), Body::default()).expect("valid boxes");
+    let (mut random, mut one) = (Random::new(1), Times::default());
+    for frame in 0..WARM_UP + 2000 {
+        one.add(frame, || {
+            for _ in 0..some {
+                let at = (random.uniform() * objects as f64) as usize;
+                space.remove(handles[at]).expect("a body");
+                handles[at] = space.insert(scene.boxes()[at], Body::default()).expect("a valid box");
+            }
+            space.update().expect("an update");
+        });
+    }
+    row(&format!("{some} of {objects} resting replaced"), one, None);
+}
+
+/// Few bodies move among many fixed ones.
+fn among_fixed(fixed: usize, movers: usize) {
+    let mut scene = Scenario::Uniform.start(fixed + movers, 1);
+    let mut space = Space::with(adaptive());
+    let handles = space.insert_all(&scene.boxes()[..movers], Body::default()).expect("valid boxes");
+    space.insert_all(&scene.boxes()[movers..], Body::fixed()).expect("valid boxes");
+    let mut one = Times::default();
+    for frame in 0..WARM_UP + 200 {
+        scene.advance();
+        one.add(frame, || {
+            space.set_all(&handles, &scene.boxes()[..movers]).expect("valid boxes");
+            space.update().expect("an update");
+        });
+    }
+    row(&format!("{movers} movers among {fixed} fixed"), one, None);
+}
+
+/// All bodies move and one in a hundred is replaced in each frame; in the other space none is.
+fn churn(objects: usize) {
+    let mut scene = Scenario::Uniform.start(objects, 1);
+    let (mut space, mut steady) = (Space::with(adaptive()), Space::with(adaptive()));
+    let mut handles = space.insert_all(scene.boxes(), Body::default()).expect("valid boxes");
+    let alone = steady.insert_all(scene.boxes(), Body::default()).expect("valid boxes");
+    let (mut random, mut one, mut other) = (Random::new(1), Times::default(), Times::default());
+    for frame in 0..frames(objects) {
+        scene.advance();
+        one.add(frame, || {
+            for _ in 0..objects / 100 {
+                let at = (random.uniform() * objects as f64) as usize;
+                space.remove(handles[at]).expect("a body");
+                handles[at] = space.insert(scene.boxes()[at], Body::default()).expect("a valid box");
+            }
+            space.set_all(&handles, scene.boxes()).expect("valid boxes");
+            space.update().expect("an update");
+        });
+        other.add(frame, || {
+            steady.set_all(&alone, scene.boxes()).expect("valid boxes");
+            steady.update().expect("an update");
+        });
+    }
+    row(&format!("{objects} moving, 1 % replaced: none replaced"), one, Some(other));
+}
+
+/// Bodies that the filter lets meet hardly any other.
+fn filtered() {
+    let crowd = |space: &mut Space, objects: usize, body: Body| {
+        let boxes: Vec<Aabb> = (0..objects).map(|k| Aabb::cube([(k % 100) as f32 * 1e-4, 0.0, 0.0], 1.0)).collect();
+        space.insert_all(&boxes, body).expect("valid boxes")
+    };
+    let run = |name: &str, mut space: Space, handles: &[Handle]| {
+        let boxes: Vec<Aabb> = handles.iter().map(|&handle| *space.get(handle).expect("a body").0).collect();
+        let mut one = Times::default();
+        for frame in 0..WARM_UP + 200 {
+            one.add(frame, || {
+                space.set_all(handles, &boxes).expect("valid boxes");
+                space.update().expect("an update");
+            });
+        }
+        row(name, one, None);
+    };
+    let mut space = Space::with(adaptive());
+    let handles = crowd(&mut space, 20_000, Body::default().groups(1).masks(2));
+    run("20000 on one spot, no pair allowed", space, &handles);
+    let mut space = Space::with(adaptive());
+    let mut handles = crowd(&mut space, 20_000, Body::default().groups(1).masks(2));
+    let sensors: Vec<Aabb> = (0..20).map(|k| Aabb::cube([k as f32 * 0.3, 1.99, 1.99], 0.01)).collect();
+    handles.extend(space.insert_all(&sensors, Body::default().groups(2).masks(1)).expect("valid boxes"));
+    run("20 sensors over a crowd of 20000", space, &handles);
+}
+
+fn main() {
+    println!("| what: beside what | n | median, µs | p99, µs | beside, µs | ratio |");
+    println!("|---|---|---|---|---|---|");
+    for scenario in [Scenario::Uniform, Scenario::Clustered, Scenario::Resting] {
+        [1000, 10_000, 100_000].into_iter().for_each(|objects| all_moving(scenario, objects));
+    }
+    few_of_many(100_000, 100);
+    replaced(20_000, 20);
+    among_fixed(1_000_000, 2000);
+    [1000, 10_000, 100_000].into_iter().for_each(churn);
+    filtered();
+}
