@@ -258,9 +258,9 @@ impl PairCache {
         } else {
             changes.gone.clone().for_each(|id| tree.remove(id as u32));
             let far = shares.iter().flat_map(|s| s.far.iter().copied());
-            tree.insert(grown.as_slice(), far, changes.new.start, pairs.screen())?;
+            let far = (far, changes.new.start);
             let wanted = motion.wants_renewal(boxes.len()) || tree.is_sparse(boxes.len());
-            if tree.renew(workers, grown.as_slice(), pairs.screen(), wanted)? {
+            if tree.update(workers, grown.as_slice(), far, pairs.screen(), wanted)? {
                 motion.renewed();
             }
             tree.refit(workers, grown.as_slice(), shares.iter().map(|s| &s.left[..]))?;

@@ -72,8 +72,10 @@ pub struct Tree {
     /// The curve of the present order.
     curve: Option<Curve>,
     renewal: Option<Renewal>,
-    /// Boxes that are being appended.
-    appended: Vec<u64>,
+    /// Boxes that are being inserted.
+    inserted: Vec<u64>,
+    /// Codes at which the active leaves began when they were sorted.
+    starts: Vec<u32>,
     simd: Simd,
 }
 
@@ -118,7 +120,8 @@ impl Tree {
             order: Order::default(),
             curve: None,
             renewal: None,
-            appended: Vec::new(),
+            inserted: Vec::new(),
+            starts: Vec::new(),
             simd,
         }
     }
@@ -153,17 +156,19 @@ impl Tree {
     ) -> Result<(), Error> {
         let curve = Curve::over(stats, members.len(boxes));
         let split = self.order.sort(workers, boxes, members, &curve, screen)?;
-        self.arrange(workers, boxes, curve, split, screen)?;
+        self.arrange(workers, boxes, curve, split, |_| false, screen)?;
         self.sweep(workers, boxes);
         Ok(())
     }
 
     /// Sorts all boxes anew, in several calls of which none takes long. Returns whether they stand in the new order
-    /// now. If the number of boxes has changed since the last call, this begins again.
+    /// now, but for those that are `out` of the tree. If the number of boxes has changed since the last call, this
+    /// begins again.
     pub(crate) fn renew(
         &mut self,
         workers: &Workers,
         boxes: &[Aabb],
+        out: impl Fn(u32) -> bool + Sync,
         stats: impl FnOnce() -> SceneStats,
         screen: Option<&Screen>,
     ) -> Result<bool, Error> {
@@ -178,7 +183,10 @@ impl Tree {
                 self.order.code(workers, boxes, all, part(len, step, RENEWAL_PARTS), &renewal.curve, screen)?;
             }
             RENEWAL_PARTS => renewal.active = self.order.finish(workers, boxes)?,
-            _ => return self.arrange(workers, boxes, renewal.curve, renewal.active, screen).map(|()| true),
+            _ => {
+                let Renewal { curve, active, .. } = renewal;
+                return self.arrange(workers, boxes, curve, active, out, screen).map(|()| true);
+            }
         }
         renewal.step += 1;
         self.renewal = Some(renewal);
@@ -197,6 +205,7 @@ impl Tree {
         boxes: &[Aabb],
         curve: Curve,
         split: usize,
+        out: impl Fn(u32) -> bool + Sync,
         screen: Option<&Screen>,
     ) -> Result<(), Error> {
         let Self { ids, places: in_use, levels, active, sweeps, order, .. } = self;
@@ -210,14 +219,17 @@ impl Tree {
         places[split..passive_from].fill(NOBODY);
         let passive = places.len().min(passive_from);
         let (before, behind) = places.split_at_mut(passive);
-        workers.map(&sorted[..split], &mut before[..split], |_, &key| key as u32);
-        workers.map(&sorted[split..], behind, |_, &key| key as u32);
+        let of = |_, &key: &u64| if out(key as u32) { NOBODY } else { key as u32 };
+        workers.map(&sorted[..split], &mut before[..split], of);
+        workers.map(&sorted[split..], behind, of);
         ids[*in_use..].fill(NOBODY);
         sweeps.begin(order.shapes().iter().map(|(long, at)| {
             let by = if at.start < split { 0 } else { passive_from - split };
             Kind { long: *long, leaves: (at.start + by).div_ceil(LANES)..(at.end + by) / LANES }
         }));
         self.fill(workers, boxes, |_, _| true);
+        self.starts.clear();
+        self.starts.extend_from_slice(self.order.starts());
         (self.curve, self.renewal) = (Some(curve), None);
         self.mark(workers, screen)
     }
@@ -402,25 +414,43 @@ impl Tree {
         &self.ids
     }
 
-    /// Adds boxes behind all others, along the curve. They have no bounds yet. Calls `placed` with the place and the id
-    /// of each.
-    pub(crate) fn append(
+    /// Adds boxes: to empty lanes near their place on the curve, else behind all others. They have no bounds yet. Calls
+    /// `placed` with the place and the id of each.
+    pub(crate) fn insert(
         &mut self,
         boxes: &[Aabb],
         ids: impl Iterator<Item = u32>,
         screen: Option<&Screen>,
         mut placed: impl FnMut(usize, u32),
     ) -> Result<(), Error> {
-        self.appended.clear();
-        self.appended.extend(ids.map(u64::from));
-        if self.appended.is_empty() {
+        self.inserted.clear();
+        self.inserted.extend(ids.map(u64::from));
+        if self.inserted.is_empty() {
             return Ok(());
         }
         if let Some(curve) = &self.curve {
-            curve.recode(&mut self.appended, boxes);
-            self.appended.sort_unstable();
+            curve.recode(&mut self.inserted, boxes);
+            self.inserted.sort_unstable();
         }
-        let places = (self.places + self.appended.len()).next_multiple_of(LANES);
+        // What jumps while a renewal goes on has its old code there.
+        if let Some(renewal) = self.renewal.as_ref().filter(|renewal| renewal.step <= RENEWAL_PARTS) {
+            let known = part(renewal.boxes, renewal.step, RENEWAL_PARTS).start;
+            let ids = self.inserted.iter().map(|&key| key as u32).filter(|&id| (id as usize) < known);
+            ids.for_each(|id| self.order.code_again(id, boxes, &renewal.curve, screen));
+        }
+        let mut behind = 0;
+        for at in 0..self.inserted.len() {
+            let key = self.inserted[at];
+            if let Some(place) = self.free_place_near((key >> 32) as u32) {
+                self.ids[place] = key as u32;
+                placed(place, key as u32);
+                self.widen_marks(place, key as u32, screen);
+            } else {
+                self.inserted[behind] = key;
+                behind += 1;
+            }
+        }
+        let places = (self.places + behind).next_multiple_of(LANES);
         grow(&mut self.ids, places, NOBODY)?;
         let mut nodes = places / LANES;
         // The last level grows beyond 16 nodes, so that no level has to be added.
@@ -428,23 +458,36 @@ impl Tree {
             grow(level, nodes, Node::EMPTY)?;
             nodes = nodes.div_ceil(LANES);
         }
-        for (place, &key) in (self.places..).zip(&self.appended) {
-            self.ids[place] = key as u32;
-            placed(place, key as u32);
-        }
         for (marks, level) in self.marks.iter_mut().zip(&self.levels) {
             grow(marks, level.len(), Marks::EMPTY)?;
         }
-        for (place, &key) in (self.places..).zip(&self.appended) {
-            let of = screen.map_or(&Membership::ALL, |screen| screen.filter.of(key as u32));
-            let mut at = place;
-            for marks in self.marks.iter_mut().take_while(|marks| !marks.is_empty()) {
-                marks[at / LANES].widen(at % LANES, of);
-                at /= LANES;
-            }
+        for at in 0..behind {
+            let id = self.inserted[at] as u32;
+            self.ids[self.places] = id;
+            placed(self.places, id);
+            self.widen_marks(self.places, id, screen);
+            self.places += 1;
         }
-        self.places += self.appended.len();
         Ok(())
+    }
+
+    /// Returns an empty lane near a code, in one of the leaves that were sorted.
+    fn free_place_near(&self, code: u32) -> Option<usize> {
+        let leaf = self.starts.partition_point(|&start| start <= code).saturating_sub(1);
+        let near =
+            [leaf, leaf + 1, leaf.wrapping_sub(1), leaf + 2].into_iter().filter(|&leaf| leaf < self.starts.len());
+        // Lanes from `places` on are for those behind all others.
+        near.flat_map(|leaf| leaf * LANES..(leaf + 1) * LANES)
+            .find(|&place| place < self.places && self.ids[place] == NOBODY)
+    }
+
+    fn widen_marks(&mut self, place: usize, id: u32, screen: Option<&Screen>) {
+        let of = screen.map_or(&Membership::ALL, |screen| screen.filter.of(id));
+        let mut at = place;
+        for marks in self.marks.iter_mut().take_while(|marks| !marks.is_empty()) {
+            marks[at / LANES].widen(at % LANES, of);
+            at /= LANES;
+        }
     }
 
     /// Removes the box at a place.

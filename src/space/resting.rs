@@ -109,7 +109,7 @@ impl Resting {
             (self.fresh, self.excess) = ([0; 2], 0);
             self.tree.build(&self.workers, boxes, Members::Of(&self.members), &stats, None)?;
         } else {
-            self.tree.insert(boxes, arrivals.iter().copied(), 0, None)?;
+            self.tree.update(&self.workers, boxes, (arrivals.iter().copied(), 0), None, false)?;
             self.tree.refit(&self.workers, boxes, std::iter::once(&arrivals[..]))?;
         }
         self.is_built = true;

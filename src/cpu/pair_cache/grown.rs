@@ -55,6 +55,8 @@ pub(super) struct Share {
 pub(super) struct Changes {
     /// Number of boxes that left their grown box, new and removed ones included.
     pub(super) left: usize,
+    /// Those of them that jumped, new and removed ones included: no margin would have held them.
+    pub(super) jumped: usize,
     /// New boxes.
     pub(super) new: Range<usize>,
     /// Removed boxes.
@@ -131,7 +133,8 @@ impl Grown {
             self.flags[id / 64].dirty |= 1 << (id % 64);
         }
         let left = shares.iter().map(|s| s.left.len()).sum::<usize>() + gone.len();
-        Ok(Changes { left, new, gone })
+        let jumped = shares.iter().map(|s| s.far.len()).sum::<usize>() + gone.len();
+        Ok(Changes { left, jumped, new, gone })
     }
 
     /// Runs one phase: grows every box anew. The boxes must be valid.

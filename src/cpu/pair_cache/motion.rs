@@ -113,7 +113,7 @@ struct Keeping {
     cost: f32,
     /// What of that the kept pairs took in the last frame.
     tests: f32,
-    /// Share of the boxes that leave in a frame and kept pairs for each box, averaged over the last [`LEARNING`]
+    /// Share of the boxes that leave in a frame without a jump and kept pairs for each box, averaged over the last [`LEARNING`]
     /// frames.
     leaving: f32,
     kept: f32,
@@ -307,6 +307,7 @@ impl Motion {
         let Some(k) = &mut self.keeping else { return false };
         let share = |count: usize| count as f32 / objects.max(1) as f32;
         let (left, kept, rebuilt) = (share(changes.left), share(did.kept_pairs), did.rebuilt);
+        let outgrown = share(changes.left - changes.jumped);
         let nodes = did.nodes as f32 / changes.left.max(1) as f32;
         let leaving = if left > 0.0 { cost::AGAIN + cost::left(far, nodes) * left } else { 0.0 };
         let work = if rebuilt { cost::rebuild(far, kept) } else { leaving };
@@ -316,7 +317,7 @@ impl Motion {
         k.work.add(now, rebuilt);
         k.kept += (kept - k.kept) / LEARNING;
         // Boxes that move alike leave together, in frames in which all is made again.
-        k.leaving += if k.frames > 0 { (left - k.leaving) / LEARNING } else { 0.0 };
+        k.leaving += if k.frames > 0 { (outgrown - k.leaving) / LEARNING } else { 0.0 };
         if rebuilt {
             (k.grown, k.missed, k.wide_from) = (k.margin.share, 0.0, None);
             (k.fresh, k.excess) = ([0.0; 2], 0.0);
@@ -329,7 +330,7 @@ impl Motion {
             }
             k.grown += (k.margin.share - k.grown) * left.min(1.0);
             k.nodes += if changes.left > 0 { (nodes - k.nodes) / LEARNING } else { 0.0 };
-            k.missed = (k.missed + k.narrower_saves(far, kept, left)).max(0.0);
+            k.missed = (k.missed + k.narrower_saves(far, kept, outgrown)).max(0.0);
         }
         // At the best margin the two costs grow at the same rate: kept pairs as (1 + 2 m)^3, boxes that leave as m^-p
         // with p between 1, for those that fly straight on, and 2, for those that wander.

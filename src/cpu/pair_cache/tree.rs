@@ -26,6 +26,8 @@ pub(crate) struct GrownTree {
     tree: Tree,
     /// The place of each box in the tree.
     place_of: Vec<Place>,
+    /// One bit for each box that is out of the tree, while others are sorted anew.
+    out: Vec<u64>,
     /// The moved boxes: place in the upper half, position in the input in the lower.
     keys: Vec<u64>,
     moved: usize,
@@ -49,6 +51,7 @@ impl GrownTree {
         Self {
             tree: Tree::new(simd),
             place_of: Vec::new(),
+            out: Vec::new(),
             keys: Vec::new(),
             moved: 0,
             scratch: Vec::new(),
@@ -74,19 +77,33 @@ impl GrownTree {
         self.note_places(workers, boxes.len())
     }
 
-    /// Goes on to sort all boxes anew if that has begun or is `wanted`. Returns whether they stand in the new order.
-    pub(crate) fn renew(
+    /// Moves the boxes `far` to new leaves, which have no bounds until [`refit`](Self::refit) sets them; those from
+    /// `new` on are not in the tree yet. Goes on to sort all boxes anew if that has begun or is `wanted`. Returns whether
+    /// they stand in the new order.
+    pub(crate) fn update(
         &mut self,
         workers: &Workers,
         boxes: &[Aabb],
+        (far, new): (impl Iterator<Item = u32> + Clone, usize),
         screen: Option<&Screen>,
         wanted: bool,
     ) -> Result<bool, Error> {
-        let goes_on = wanted || self.tree.is_being_renewed();
-        let renewed = goes_on && self.tree.renew(workers, boxes, || SceneStats::of(boxes), screen)?;
-        if renewed {
-            self.note_places(workers, boxes.len())?;
+        ensure(&mut self.place_of, boxes.len(), "boxes in a tree")?;
+        ensure(&mut self.out, boxes.len().div_ceil(64), "boxes in a tree")?;
+        far.clone().take_while(|&id| (id as usize) < new).for_each(|id| self.remove(id));
+        let mut renewed = false;
+        if wanted || self.tree.is_being_renewed() {
+            far.clone().for_each(|id| self.out[id as usize / 64] |= 1 << (id % 64));
+            let out = |id: u32| self.out[id as usize / 64] >> (id % 64) & 1 == 1;
+            let done = self.tree.renew(workers, boxes, out, || SceneStats::of(boxes), screen);
+            far.clone().for_each(|id| self.out[id as usize / 64] = 0);
+            renewed = done?;
+            if renewed {
+                self.note_places(workers, boxes.len())?;
+            }
         }
+        let place_of = &mut self.place_of;
+        self.tree.insert(boxes, far, screen, |place, id| *place_of[id as usize].0.get_mut() = place as u32)?;
         Ok(renewed)
     }
 
@@ -127,21 +144,6 @@ impl GrownTree {
     /// Adds part `k` of `parts` of the pairs of all boxes that were in the tree when it was built.
     pub(crate) fn self_pairs(&self, k: usize, parts: usize, pairs: &mut Pairs) {
         self.tree.self_pairs(k, parts, pairs);
-    }
-
-    /// Moves boxes to new leaves, which have no bounds until [`refit`](Self::refit) sets them. Boxes from `new` on are
-    /// not in the tree yet.
-    pub(crate) fn insert(
-        &mut self,
-        boxes: &[Aabb],
-        ids: impl Iterator<Item = u32> + Clone,
-        new: usize,
-        screen: Option<&Screen>,
-    ) -> Result<(), Error> {
-        ensure(&mut self.place_of, boxes.len(), "boxes in a tree")?;
-        ids.clone().take_while(|&id| (id as usize) < new).for_each(|id| self.remove(id));
-        let place_of = &mut self.place_of;
-        self.tree.append(boxes, ids, screen, |place, id| *place_of[id as usize].0.get_mut() = place as u32)
     }
 
     /// Removes a box.

@@ -31,6 +31,8 @@ pub(super) struct Order {
     /// Where the boxes of each shape stand, active ones first: the axes on which they are oversized, one bit
     /// each, and their places in the order.
     shapes: Vec<(u32, Range<usize>)>,
+    /// Code of the first active box of each leaf.
+    starts: Vec<u32>,
     /// Dense cells that are not sorted yet: the large ones, and the others.
     large: Vec<Range<usize>>,
     small: Vec<Range<usize>>,
@@ -47,6 +49,11 @@ impl Order {
     /// Returns the sorted boxes: their positions are in the lower halves.
     pub(super) fn ids(&self) -> &[u64] {
         &self.keys[..self.len]
+    }
+
+    /// Returns the code of the first active box of each leaf, ascending.
+    pub(super) fn starts(&self) -> &[u32] {
+        &self.starts
     }
 
     /// Returns where the boxes of each shape stand that were [sorted](Self::sort).
@@ -107,12 +114,11 @@ impl Order {
         let keys = &mut self.keys[part.clone()];
         let invalid = AtomicUsize::new(usize::MAX);
         let key = |id: usize, b: &Aabb| {
-            let (code, valid) = curve.code(b);
+            let (key, valid) = key(id, b, curve, screen);
             if !valid {
                 invalid.fetch_min(id, Relaxed);
             }
-            let passive = if screen.is_some_and(|s| s.is_passive(id)) { PASSIVE } else { 0 };
-            u64::from(code | passive) << 32 | id as u64
+            key
         };
         match members {
             Members::From(first) => {
@@ -125,11 +131,19 @@ impl Order {
         boxes.get(invalid..).map_or(Ok(()), |rest| Aabb::check(rest, invalid))
     }
 
+    /// Makes the key of a box anew, if all boxes are members.
+    pub(super) fn code_again(&mut self, id: u32, boxes: &[Aabb], curve: &Curve, screen: Option<&Screen>) {
+        let id = id as usize;
+        self.keys[id] = key(id, &boxes[id], curve, screen).0;
+    }
+
     /// Sorts all keys. Returns the number of active boxes; they come first.
     pub(super) fn finish(&mut self, workers: &Workers, boxes: &[Aabb]) -> Result<usize, Error> {
         let keys = &mut self.keys[..self.len];
         sort(workers, keys, &mut self.scratch)?;
         let active = keys.partition_point(|&key| code(key) < PASSIVE);
+        self.starts.clear();
+        self.starts.extend(keys[..active].iter().step_by(LANES).map(|&key| code(key)));
         self.shapes.clear();
         for (keys, first) in [(&keys[..active], 0), (&keys[active..], active)] {
             let mut at = 0;
@@ -185,6 +199,14 @@ impl Order {
         workers.each_of(cells, |keys| sort_dense_cell(keys, boxes));
         Ok(())
     }
+}
+
+/// Makes the key of a box. Returns whether the box is valid, too.
+#[inline(always)]
+fn key(id: usize, b: &Aabb, curve: &Curve, screen: Option<&Screen>) -> (u64, bool) {
+    let (code, valid) = curve.code(b);
+    let passive = if screen.is_some_and(|s| s.is_passive(id)) { PASSIVE } else { 0 };
+    (u64::from(code | passive) << 32 | id as u64, valid)
 }
 
 fn code(key: u64) -> u32 {

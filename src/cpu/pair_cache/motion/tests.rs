@@ -44,7 +44,7 @@ fn a_pause_ends_when_boxes_that_moved_too_far_come_to_rest() {
         let plan = |moved| FramePlan::default().with_moved(Some(moved)).with_pairs(Some(500.0));
         let mut motion = Motion::new(false);
         motion.advise(&plan(0.001), &boxes);
-        let changes = Changes { left: 0, new: 0..0, gone: 0..0 };
+        let changes = Changes { left: 0, jumped: 0, new: 0..0, gone: 0..0 };
         let did = Work { kept_pairs: 500, nodes: 0, rebuilt: false };
         assert!((0..kept).all(|_| motion.learn(1000, &changes, &did, 0.0)));
         motion.keeping.as_mut().unwrap().tests = 0.0;
@@ -66,7 +66,7 @@ fn a_pause_ends_when_boxes_that_moved_too_far_come_to_rest() {
 fn frames_that_others_ran_count_for_a_pause_and_end_it_where_boxes_have_come_to_rest_and_are_no_crowd() {
     let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
     let plan = |moved| FramePlan::default().with_moved(Some(moved)).with_pairs(Some(500.0));
-    let changes = Changes { left: 0, new: 0..0, gone: 0..0 };
+    let changes = Changes { left: 0, jumped: 0, new: 0..0, gone: 0..0 };
     let did = Work { kept_pairs: 500, nodes: 0, rebuilt: false };
     // Frames from scratch after so many of others, where boxes moved so far before and move so far now.
     let paused = |too_many: bool, missed: u64, moves: [f64; 2]| {
@@ -98,7 +98,7 @@ fn where_half_of_the_boxes_leave_at_once_the_margin_stays_unless_they_move_at_an
         // As found in many frames.
         motion.keeping.as_mut().unwrap().margin.share = 0.123;
         motion.advise(&plan(moved), &boxes);
-        let left = Changes { left: 600, new: 400..1000, gone: 0..0 };
+        let left = Changes { left: 600, jumped: 0, new: 400..1000, gone: 0..0 };
         motion.renew(&plan(moved), &boxes, &left).share
     };
     assert_eq!(share_after(0.021), 0.123);
@@ -111,7 +111,7 @@ fn boxes_are_sorted_anew_when_queries_have_become_expensive() {
     let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
     motion.found(1000, 0);
     (0..2).for_each(|_| _ = motion.advise(&FramePlan::default(), &boxes));
-    let changes = Changes { left: 10, new: 0..0, gone: 0..0 };
+    let changes = Changes { left: 10, jumped: 0, new: 0..0, gone: 0..0 };
     let did = |nodes: u64, rebuilt| Work { kept_pairs: 1000, nodes: nodes * 10, rebuilt };
     motion.learn(1000, &changes, &did(0, true), 0.0);
     let mut frames = |nodes: u64| {
@@ -169,7 +169,7 @@ fn a_margin_that_keeps_too_many_pairs_is_halved_and_one_that_too_many_leave_is_n
             }
         };
         let first = keep(&mut motion);
-        let changes = Changes { left, new: 0..0, gone: 0..0 };
+        let changes = Changes { left, jumped: 0, new: 0..0, gone: 0..0 };
         let did = Work { kept_pairs, nodes: 12 * left as u64, rebuilt: false };
         assert!((0..100).any(|_| !motion.learn(1000, &changes, &did, 0.0)), "it never ceases to pay");
         motion.stop(false);

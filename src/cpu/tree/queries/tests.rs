@@ -72,7 +72,7 @@ fn trees(random: &mut Random, len: usize, churn: bool) -> (Vec<Tree>, Vec<Option
                 tree.remove(place);
             }
             let mut placed = Vec::new();
-            tree.append(&boxes, back.iter().copied(), None, |place, id| placed.push((place, id))).unwrap();
+            tree.insert(&boxes, back.iter().copied(), None, |place, id| placed.push((place, id))).unwrap();
             for (mut place, id) in placed {
                 for level in tree.levels_mut().iter_mut().take_while(|level| !level.is_empty()) {
                     level[place / 16].widen(place % 16, &boxes[id as usize]);
