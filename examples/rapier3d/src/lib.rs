@@ -1,9 +1,9 @@
 //! Bodies that break into pieces, as in Figure 1 of Avril, Gouranton and Arnaldi (ISVRI 2011), with the dynamics of
-//! rapier3d; and the boxes of their colliders in Sapwise's adaptive broad phase, compared with rapier's own in every
-//! step.
+//! rapier3d; and the boxes of their colliders in a [`Space`](sapwise::Space), whose pairs are compared with those of
+//! rapier's own broad phase in every step.
 //!
-//! [`World`] is the simulation, [`Comparison`] runs Sapwise beside it and holds the pairs of one against those of the
-//! other, and [`Recording`] keeps the boxes for a file that `sapwise run` and `sapwise pairs` read.
+//! [`World`] is the simulation, [`Comparison`] runs Sapwise beside it and compares the pairs of both, and [`Recording`]
+//! keeps the boxes for a file that `sapwise run` and `sapwise pairs` read.
 
 mod comparison;
 mod random;

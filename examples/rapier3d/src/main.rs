@@ -1,7 +1,7 @@
 //! Runs the simulation and compares the broad phases in every frame; see the library of this package.
 
 use sapwise::Registry;
-use sapwise_example_rapier3d::{Comparison, Recording, Settings, World};
+use sapwise_example_rapier3d::{Comparison, Counts, Recording, Settings, World};
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::fs::File;
@@ -10,8 +10,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 const USAGE: &str = "\
-Bodies that fall, collide and break into pieces in rapier3d; their boxes feed Sapwise in every frame, and the pairs are
-compared with those of rapier's own broad phase.
+Bodies that fall, collide and break into pieces in rapier3d; a Space of Sapwise follows their boxes, and
+its pairs are compared with those of rapier's own broad phase in every frame.
 
 usage: cargo run --release -p sapwise-example-rapier3d -- [OPTIONS]
 
@@ -61,7 +61,11 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let mut ran: BTreeMap<String, usize> = BTreeMap::new();
     let (mut least, mut most, mut pairs) = (usize::MAX, 0, 0);
     if !options.quiet {
-        println!("{:>6} {:>7} {:>7} {:>9} {:>9}  algorithm", "frame", "bodies", "boxes", "pairs", "rapier's");
+        let [frame, bodies, boxes, pairs] = ["frame", "bodies", "boxes", "pairs"];
+        println!(
+            "{frame:>6} {bodies:>7} {boxes:>7} {pairs:>7} {:>7} {:>7} {:>9}  algorithm",
+            "begun", "ended", "rapier's"
+        );
     }
     for frame in 0..options.frames {
         world.prepare_step();
@@ -73,11 +77,12 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         let algorithm = comparison.last_decision().map_or(String::new(), |d| d.algorithm.to_string());
         if !options.quiet && frame % LINE_EVERY == 0 {
             let bodies = world.bodies();
-            println!("{frame:>6} {bodies:>7} {:>7} {:>9} {:>9}  {algorithm}", counts.boxes, counts.own, counts.rapier);
+            let Counts { boxes, found, begun, ended, rapier, .. } = counts;
+            println!("{frame:>6} {bodies:>7} {boxes:>7} {found:>7} {begun:>7} {ended:>7} {rapier:>9}  {algorithm}");
         }
         *ran.entry(algorithm).or_default() += 1;
         if options.record.is_some() {
-            recording.push(comparison.boxes());
+            recording.push(&comparison.boxes(world.physics()));
         }
     }
     if let Some(path) = &options.record {

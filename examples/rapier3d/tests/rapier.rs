@@ -5,7 +5,7 @@ use sapwise::{Aabb, Registry};
 use sapwise_example_rapier3d::{Comparison, Counts, Mismatch, Recording, Settings, World};
 use std::process::{Command, Output};
 
-/// So many frames, each compared.
+/// Compares each of these frames.
 fn course(settings: Settings, frames: usize) -> (Vec<Counts>, Recording) {
     let mut world = World::new(settings);
     let mut comparison = Comparison::new(&Registry::with_cores(2)).unwrap();
@@ -14,28 +14,38 @@ fn course(settings: Settings, frames: usize) -> (Vec<Counts>, Recording) {
         world.prepare_step();
         assert!(world.bodies() <= settings.bodies);
         comparison.before_step(world.physics()).unwrap();
-        recording.push(comparison.boxes());
+        recording.push(&comparison.boxes(world.physics()));
         world.step();
         comparison.after_step(world.physics()).unwrap_or_else(|mismatch| panic!("{mismatch}"))
     };
     ((0..frames).map(frame).collect(), recording)
 }
 
+/// Returns the number of boxes that overlap or touch, whether they may meet or not.
+fn overlapping(boxes: &[Aabb]) -> usize {
+    boxes.iter().enumerate().map(|(j, b)| boxes[..j].iter().filter(|a| a.overlaps(b)).count()).sum()
+}
+
 #[test]
 fn both_have_the_same_pairs_in_every_frame_while_bodies_break_and_are_cleared() {
     for seed in [1, 2] {
-        let (counts, _) = course(Settings { bodies: 400, seed }, 420);
+        let (counts, recording) = course(Settings { bodies: 400, seed }, 420);
         let most = counts.iter().map(|c| c.boxes).max().unwrap();
         let last = counts[299].boxes;
         // From the whole cubes, eight boxes each, to hundreds of pieces, and back to few.
         assert_eq!(counts[0].boxes, 85, "seed {seed}");
         assert!(most > 350 && last < 40, "seed {seed}: {most} boxes, then {last}");
         // A comparison of few pairs would prove little, and so would one in which margins or rules play no part.
-        let fullest = counts.iter().max_by_key(|c| c.own).unwrap();
+        let (frame, fullest) = counts.iter().enumerate().max_by_key(|(_, c)| c.own).unwrap();
         assert!(fullest.own > 500 && fullest.rapier > fullest.own, "seed {seed}: {fullest:?}");
-        // The pairs of the floor and the walls are not looked for: what is left out is debris.
-        assert!(fullest.overlapping > fullest.wanted as u64 + 50, "seed {seed}: {fullest:?}");
-        assert!(counts[0].overlapping >= 272 && counts[0].own == 0, "seed {seed}: {:?}", counts[0]);
+        // Debris, and the floor with the walls.
+        let all: Vec<usize> = recording.frames().map(overlapping).collect();
+        assert!(all[frame] > fullest.found + 50, "seed {seed}: {} pairs, {fullest:?}", all[frame]);
+        assert!(all[0] >= 272 && counts[0].own == 0, "seed {seed}: {} pairs, {:?}", all[0], counts[0]);
+        for pair in counts.windows(2) {
+            assert_eq!(pair[0].found + pair[1].begun, pair[1].found + pair[1].ended, "seed {seed}: {pair:?}");
+        }
+        assert!(counts.iter().any(|c| c.ended > 100), "seed {seed}");
     }
 }
 
@@ -60,8 +70,8 @@ fn a_body_that_moves_behind_the_back_of_the_comparison_is_a_mismatch() {
     let mut world = PhysicsWorld::new();
     let cube = || ColliderBuilder::cuboid(0.5, 0.5, 0.5);
     let at = |x| RigidBodyBuilder::dynamic().translation(Vector::new(x, 0.0, 0.0));
-    world.insert(at(0.0), cube());
-    let (far, _) = world.insert(at(5.0), cube());
+    let (_, near_cube) = world.insert(at(0.0), cube());
+    let (far, far_cube) = world.insert(at(5.0), cube());
     let mut comparison = Comparison::new(&Registry::with_cores(1)).unwrap();
     comparison.before_step(&world).unwrap();
     world.step();
@@ -70,8 +80,13 @@ fn a_body_that_moves_behind_the_back_of_the_comparison_is_a_mismatch() {
     world.bodies[far].set_translation(Vector::new(0.9, 0.0, 0.0), true);
     world.step();
     let mismatch = comparison.after_step(&world).unwrap_err();
-    assert!(matches!(mismatch, Mismatch { step: 1, pair: (0, 1), only_ours: false, kept: true, .. }), "{mismatch:?}");
-    assert!(mismatch.to_string().starts_with("step 1: of the boxes that rapier keeps rapier has the pair (0, 1)"));
+    assert!(matches!(mismatch, Mismatch { step: 1, only_ours: false, fat: true, .. }), "{mismatch:?}");
+    assert_eq!(mismatch.pair, [near_cube, far_cube]);
+    let told = mismatch.to_string();
+    assert!(
+        told.starts_with("step 1, fat AABBs: rapier has the pair of colliders 0 and 1, Sapwise lacks it"),
+        "{told}"
+    );
 }
 
 #[test]
