@@ -1,7 +1,22 @@
 //! Broad-phase collision detection with whichever algorithm is fastest on this machine, for this frame.
 //!
-//! An engine passes its [`Aabb`]s to [`Adaptive`] every frame and gets [`Pairs`] back. By its [`Tuning`], [`Adaptive`]
-//! runs the algorithm of the [`Registry`] that is cheapest for the [load](algorithm::Load) of the frame.
+//! A [`Space`] holds the bodies of an engine. The engine sets those that moved, and gets the pairs that overlap:
+//!
+//! ```
+//! use sapwise::{Aabb, Body, Space};
+//!
+//! let mut space = Space::new();
+//! let wall = space.insert(Aabb::cube([0.0; 3], 0.5), Body::fixed())?;
+//! let player = space.insert(Aabb::cube([5.0, 0.0, 0.0], 0.5), Body::default())?;
+//! space.set(player, Aabb::cube([1.0, 0.0, 0.0], 0.5))?;
+//! space.update()?;
+//! assert_eq!(space.pairs(), [(wall, player)]);
+//! # Ok::<(), sapwise::Error>(())
+//! ```
+//!
+//! The space searches with an [`Adaptive`]. By its [`Tuning`], this runs the algorithm of the [`Registry`] that is
+//! cheapest for the [load](algorithm::Load) of the frame. A program that has an array of boxes in every frame calls it
+//! directly:
 //!
 //! ```
 //! use sapwise::{Aabb, Adaptive, BroadPhase, Pairs, Registry, Tuning};
