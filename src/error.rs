@@ -41,7 +41,8 @@ pub enum Error {
         /// Number of ids.
         ids: usize,
     },
-    /// A handle of a body that was removed, or of another [`Space`](crate::Space).
+    /// A handle that names no body of the [`Space`](crate::Space): the body was removed, or the handle is of another
+    /// space.
     StaleHandle {
         /// The handle that was given.
         handle: Handle,
@@ -57,6 +58,15 @@ pub enum Error {
     InvalidRay {
         /// What is wrong with it.
         defect: RayDefect,
+    },
+    /// Starts of [`Worlds`](crate::Worlds) that do not begin with 0, ascend and end with the number of boxes.
+    InvalidStarts {
+        /// Position of the first wrong start.
+        index: usize,
+        /// That start.
+        start: usize,
+        /// Number of boxes.
+        boxes: usize,
     },
     /// An allocation was refused.
     OutOfMemory {
@@ -219,6 +229,13 @@ impl fmt::Display for Error {
                 write!(f, "the box for body {handle} {defect}; the body keeps its previous box")
             }
             Error::InvalidRay { defect } => write!(f, "the ray {defect}; correct it or leave the query out"),
+            Error::InvalidStarts { index, start, boxes } => {
+                write!(
+                    f,
+                    "start {index} of the worlds is {start}; begin with 0, ascend, and end with the {boxes} boxes as \
+                     the last start"
+                )
+            }
             Error::OutOfMemory { what, elements } => {
                 write!(f, "no memory for {elements} {what}; set a limit on the pairs or use fewer boxes")
             }

@@ -72,6 +72,7 @@ pub mod splitmix;
 #[doc(hidden)]
 pub mod stats;
 pub mod tuning;
+mod worlds;
 
 pub use aabb::Aabb;
 pub use adaptive::{Adaptive, Decision, Reason};
@@ -90,3 +91,4 @@ pub use rayon as rayon1;
 pub use registry::Registry;
 pub use space::{Body, Handle, Space, View};
 pub use tuning::Tuning;
+pub use worlds::Worlds;

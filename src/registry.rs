@@ -2,7 +2,7 @@
 
 use crate::algorithm::{AlgorithmId, Backend, MOST_THREADS, ParseIdError};
 use crate::broad_phase::BroadPhase;
-use crate::cpu::{self, Create, Made, Method, Simd, SimdLevel, Threads};
+use crate::cpu::{self, Create, Made, Method, Simd, SimdLevel, Threads, Workers};
 use crate::entry::Entry;
 use crate::error::{Error, Unavailable};
 use std::any::{Any, TypeId};
@@ -216,6 +216,12 @@ impl Registry {
                 entry.unavailable = unavailable(&self.threads, self.cores, threads);
             }
         }
+    }
+
+    /// Returns the threads that algorithms created from now on may use, as many as they can have.
+    pub(crate) fn most_workers(&self, method: &'static str) -> Result<Workers, Error> {
+        let most = (1..=self.cores).rev().find(|&k| self.unavailable(k).is_none());
+        Workers::new(method, most.unwrap_or(1), &self.threads)
     }
 
     fn unavailable(&self, threads: u32) -> Option<Unavailable> {

@@ -2,8 +2,8 @@
 //!
 //! Bodies that were set lately are *active*: an [`Adaptive`] finds their pairs in every update. If there are many more
 //! bodies that were not set for some updates, these *rest*: they stand in a tree, and the pairs among them stay until
-//! one of the two wakes. Each active body keeps its resting neighbours while it stays within its fat AABB. So bodies
-//! that are not set cost nothing.
+//! one of the two wakes. Each active body keeps its resting neighbours while it stays within its fat AABB. So resting
+//! bodies cost nothing.
 
 mod active;
 mod body;
@@ -39,8 +39,8 @@ pub use view::View;
 /// active one.
 const IDLE: u64 = 8;
 
-/// Bodies begin to rest when those that could are more than this many times the others, and all wake when the resting
-/// ones are fewer than half of that. Together in one search, a body that does not move costs little.
+/// Bodies begin to rest when those that could are more than this many times the others. All wake when the resting ones
+/// are fewer than half this many times the others: then one search for all is cheaper.
 const MANY: usize = 8;
 
 /// Fewest bodies that rest.
@@ -81,7 +81,7 @@ pub struct Space {
     neighbours: Neighbours,
     /// Of the active bodies, from the first query after an update on.
     tree: OnceLock<Tree>,
-    /// Of the first pairs in `pairs`.
+    /// The pairs of resting bodies, which are the first in `pairs`.
     links: Links,
     /// Number of updates.
     update: u64,
@@ -94,7 +94,7 @@ pub struct Space {
     sorter: Sorter,
     begun_keys: Vec<u64>,
     ended_keys: Vec<u64>,
-    /// Those of resting bodies, then the others.
+    /// All pairs: first those of two resting bodies.
     pairs: Vec<(Handle, Handle)>,
     begun: Vec<(Handle, Handle)>,
     ended: Vec<(Handle, Handle)>,
@@ -154,7 +154,7 @@ impl Space {
         Self::with(search.expect("the usual tuning has algorithms on one thread"))
     }
 
-    /// Makes an empty space whose active bodies `search` finds.
+    /// Makes an empty space in which `search` finds the pairs of active bodies.
     #[must_use]
     pub fn with(search: Adaptive) -> Self {
         Self {
@@ -243,7 +243,7 @@ impl Space {
     /// Sets the box of each of these bodies.
     ///
     /// # Errors
-    /// As [`set`](Self::set), for the first body with one. Then none is set.
+    /// As [`set`](Self::set), for the first handle or box that is wrong. Then no box is set.
     ///
     /// # Panics
     /// If there are not as many boxes as handles.
@@ -277,7 +277,7 @@ impl Space {
         Ok(())
     }
 
-    /// Removes these bodies, each given once.
+    /// Removes these bodies. A handle may be given twice.
     ///
     /// # Errors
     /// [`Error::StaleHandle`] for the first stale one. Then none is removed.
@@ -313,8 +313,8 @@ impl Space {
     /// Finds all pairs, and which began and ended since the previous update.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`] and [`Error::Unavailable`]. Then no pair has begun or ended, those of active bodies are
-    /// missing, and the next update compares with the last one that succeeded.
+    /// [`Error::OutOfMemory`] and [`Error::Unavailable`]. Then no pair has begun or ended, the pairs of active bodies
+    /// are missing, and the next update compares with the last one that succeeded.
     pub fn update(&mut self) -> Result<(), Error> {
         self.run()
     }
@@ -334,8 +334,7 @@ impl Space {
         &self.begun
     }
 
-    /// Returns the pairs of the previous update that there are no more, ascending. Those of removed bodies are among
-    /// them.
+    /// Returns the pairs that only the previous update had, ascending. Those of removed bodies are among them.
     #[must_use]
     pub fn ended(&self) -> &[(Handle, Handle)] {
         &self.ended

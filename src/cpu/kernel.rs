@@ -13,6 +13,7 @@ pub(crate) mod node;
 mod portable;
 pub(crate) mod ray;
 mod sixteen;
+pub(crate) mod small;
 pub(crate) mod walk;
 #[cfg(target_arch = "x86_64")]
 mod x86;

@@ -19,7 +19,9 @@ mod sort;
 mod threads;
 mod tree;
 mod workers;
+mod world;
 
+pub(crate) use columns::part;
 #[cfg(feature = "parallel")]
 pub use helpers::pinned_pool;
 pub(crate) use level::Simd;
@@ -28,7 +30,9 @@ pub(crate) use pair_cache::GrownTree;
 pub use threads::Threads;
 pub(crate) use tree::Members;
 pub use tree::{Near, Tree};
+pub(crate) use workers::Outputs;
 pub use workers::Workers;
+pub(crate) use world::WorldSearch;
 
 use crate::broad_phase::BroadPhase;
 use crate::error::Error;

@@ -26,8 +26,8 @@ impl Body {
         Self { membership: Membership { fixed: true, ..Membership::ALL }, ..Self::default() }
     }
 
-    /// Makes a body that the program moves along a path, such as a lift. It meets no fixed body and no other kinematic
-    /// one.
+    /// Makes a body that the program moves along a path, such as a lift. It meets neither fixed bodies nor kinematic
+    /// ones.
     #[must_use]
     pub fn kinematic() -> Self {
         Self { kinematic: true, ..Self::fixed() }

@@ -3,8 +3,8 @@
 use std::fmt;
 use std::num::NonZeroU64;
 
-/// Names a body of a [`Space`](crate::Space), until it is removed. A handle is never used again for another body, unless
-/// its slot has had four billion of them.
+/// Names a body of a [`Space`](crate::Space), until it is removed. No other body gets the same handle before its slot has
+/// had four billion bodies. Handles of two spaces may be equal: don't mix them.
 ///
 /// 64 bits: slot, then generation. Handles sort by slot. 0 is no handle, so `Option<Handle>` has 64 bits too.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -22,7 +22,7 @@ impl Handle {
         self.0.get()
     }
 
-    /// Returns the handle with these bits, `None` for 0. A space reports one that it did not make as stale.
+    /// Returns the handle with these bits, `None` for 0.
     #[must_use]
     pub fn from_bits(bits: u64) -> Option<Self> {
         NonZeroU64::new(bits).map(Self)

@@ -43,7 +43,7 @@ impl Neighbours {
     }
 
     /// Calls `found` with the position of each active body and the slot of each resting one that overlaps it.
-    /// `boxes_at` are by slot. Those that have woken since may be called too.
+    /// `boxes_at` are by slot. `found` may be called for bodies that have woken since, too.
     pub(super) fn each(
         &mut self,
         resting: &mut Resting,

@@ -176,8 +176,9 @@ impl Slots {
         self.changed = changes;
     }
 
-    /// Frees the slots of removed bodies.
+    /// Frees the slots of removed bodies. The lowest is used again first, whatever else was done to the bodies.
     pub(super) fn free(&mut self) {
+        self.leaving.sort_unstable_by(|a, b| b.cmp(a));
         for slot in self.leaving.drain(..) {
             let of = &mut self.slots[slot as usize];
             // 0 is no generation.

@@ -1,5 +1,6 @@
 //! SSE2, which every x86-64 CPU has, AVX2 and AVX-512.
 
+use super::small::small;
 use super::{Lanes, Query, Rows, View, brute, sweep};
 use crate::cpu::level::{Avx2, Avx512};
 use crate::pair::Pair;
@@ -205,4 +206,14 @@ pub(super) fn sweep_avx512<R: Rows>(proof: Avx512, view: &View<'_>, rows: Range<
 #[target_feature(enable = "avx512f")]
 pub(super) fn brute_avx512(proof: Avx512, view: &View<'_>, rows: Range<usize>, pairs: &mut Pairs) {
     brute(proof, view, rows, pairs);
+}
+
+#[target_feature(enable = "avx2")]
+pub(super) fn small_avx2(proof: Avx2, view: &View<'_>, first: u32, pairs: &mut Pairs) {
+    small(proof, view, first, pairs);
+}
+
+#[target_feature(enable = "avx512f")]
+pub(super) fn small_avx512(proof: Avx512, view: &View<'_>, first: u32, pairs: &mut Pairs) {
+    small(proof, view, first, pairs);
 }

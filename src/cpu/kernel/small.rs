@@ -1,0 +1,84 @@
+//! All pairs of a few dozen boxes.
+
+use super::{Lanes, Query, View};
+use crate::cpu::columns::Columns;
+use crate::cpu::level::Simd;
+use crate::pairs::Pairs;
+
+/// The most rows: a bit each in a word.
+pub(crate) const MOST_ROWS: usize = 64;
+
+/// Rows whose pairs are written together.
+const WRITTEN: usize = 8;
+
+/// Pairs written for each row before it is known whether there are any. Most boxes of a small world have at most that
+/// many behind them, and no CPU predicts the number.
+const UNASKED: usize = 2;
+
+/// Tests every row against all rows behind it, on all three axes, and adds the pairs. Row k is box `first + k`; there
+/// are at most [`MOST_ROWS`].
+pub(crate) fn small_world(simd: Simd, columns: &Columns, first: u32, pairs: &mut Pairs) {
+    let view = View::new(columns);
+    match simd {
+        // SAFETY: the proof says that this CPU has the instructions.
+        #[cfg(target_arch = "x86_64")]
+        Simd::Avx512(proof) => unsafe { super::x86::small_avx512(proof, &view, first, pairs) },
+        // SAFETY: as above.
+        #[cfg(target_arch = "x86_64")]
+        Simd::Avx2(proof) => unsafe { super::x86::small_avx2(proof, &view, first, pairs) },
+        Simd::Portable => small(super::Baseline, &view, first, pairs),
+    }
+}
+
+#[inline(always)]
+pub(super) fn small<L: Lanes>(lanes: L, view: &View<'_>, first: u32, pairs: &mut Pairs) {
+    let mut hits = [0; MOST_ROWS];
+    let hits = &mut hits[..view.len];
+    for at in (0..view.len).step_by(L::COUNT) {
+        // Those before these rows, and these.
+        let rows = view.len.min(at + L::COUNT);
+        let (low, high) = (view.low.map(|c| &c[..rows]), view.high.map(|c| &c[..rows]));
+        for (row, hits) in hits[..rows].iter_mut().enumerate() {
+            let query = Query { low: low.map(|c| c[row]), high: high.map(|c| c[row]), id: 0, begins: 0 };
+            // SAFETY: `at < view.len`; the caller enabled the instructions of `L`.
+            let mask = unsafe { lanes.reach_and_hits(view, at, &query).1 & lanes.ends_after(view, at, query.low[0]) };
+            *hits |= u64::from(mask) << at;
+        }
+    }
+    hits.iter_mut().enumerate().for_each(|(row, hits)| *hits &= !1 << row);
+    for (from, hits) in (0..).step_by(WRITTEN).zip(hits.chunks(WRITTEN)) {
+        add(first, from, hits, pairs);
+    }
+}
+
+/// Adds the pairs of row `from + k` with the rows b, b the bits of `hits[k]`. Row 0 is box `first`.
+#[inline(always)]
+fn add(first: u32, from: u32, hits: &[u64], pairs: &mut Pairs) {
+    // Wrapping: without a hit this is no box.
+    let pair = |id, hits: u64| (id, first.wrapping_add(hits.trailing_zeros()));
+    let rows = (first + from..).zip(hits.iter().copied());
+    if let Some(room) = pairs.room(WRITTEN * MOST_ROWS) {
+        let mut added = 0;
+        for (id, mut hits) in rows {
+            for _ in 0..UNASKED {
+                room[added] = pair(id, hits);
+                added += usize::from(hits != 0);
+                hits &= hits.wrapping_sub(1);
+            }
+            while hits != 0 {
+                room[added] = pair(id, hits);
+                added += 1;
+                hits &= hits - 1;
+            }
+        }
+        pairs.extend_by(added);
+    } else {
+        for (id, mut hits) in rows {
+            while hits != 0 {
+                let (id, other) = pair(id, hits);
+                pairs.push(id, other);
+                hits &= hits - 1;
+            }
+        }
+    }
+}
