@@ -165,7 +165,8 @@ impl Space {
             neighbours: Neighbours::default(),
             tree: OnceLock::new(),
             links: Links::default(),
-            update: 0,
+            // So that the first fixed bodies rest at once.
+            update: IDLE,
             rests: false,
             keys: Vec::new(),
             before: Vec::new(),

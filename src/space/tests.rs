@@ -241,6 +241,23 @@ fn bodies_that_are_not_set_rest_and_wake() {
 }
 
 #[test]
+fn fixed_bodies_rest_at_once_but_not_right_after_they_were_set() {
+    let mut space = Space::new();
+    let boxes: Vec<Aabb> = (0..400).map(|k| Aabb::cube([k as f32, 0.0, 0.0], 0.4)).collect();
+    let fixed = space.insert_all(&boxes, Body::fixed()).unwrap();
+    let active: Vec<usize> = (0..14)
+        .map(|update| {
+            if update == 4 {
+                space.set(fixed[7], Aabb::cube([7.0, 1.0, 0.0], 0.4)).unwrap();
+            }
+            space.update().unwrap();
+            space.active.len()
+        })
+        .collect();
+    assert_eq!(active, [400, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0]);
+}
+
+#[test]
 fn call_that_fails_changes_nothing() {
     let mut space = Space::new();
     let unit = Aabb::cube([0.0; 3], 1.0);

@@ -85,8 +85,7 @@ impl Space {
             let at = self.slots.at(slot);
             match at {
                 At::Active(at) if !removed => {
-                    let set_in = self.set_in(slot);
-                    self.active.set(at as usize, self.slots.boxes()[slot as usize], set_in);
+                    self.active.set(at as usize, self.slots.boxes()[slot as usize], self.update);
                     if done & SET_BODY != 0 {
                         self.active.set_body(at as usize, self.slots.body(slot));
                     }
@@ -99,29 +98,26 @@ impl Space {
             // The slot of a removed body stays taken until its pairs have ended.
             self.slots.set_at(slot, At::New);
             if !removed {
-                newcomers.push(slot);
+                // One that was set may be set again soon.
+                let rests_at_once = at == At::New && self.slots.rests_at_once(slot);
+                newcomers.push((slot, if rests_at_once { self.update - IDLE } else { self.update }));
             }
         }
         left.sort_unstable();
         let mut places = left.iter().copied();
-        newcomers.into_iter().for_each(|slot| self.activate(slot, places.next()));
+        newcomers.into_iter().for_each(|(slot, set_in)| self.activate(slot, set_in, places.next()));
         // The highest first: then what takes the place of one never leaves itself.
         places.rev().for_each(|at| self.leave_active(at));
     }
 
-    /// Returns the update in which a body that is set now counts as set.
-    fn set_in(&self, slot: u32) -> u64 {
-        if self.slots.rests_at_once(slot) { self.update.saturating_sub(IDLE) } else { self.update }
-    }
-
     /// Adds a body to the active ones, at this place if there is one.
-    fn activate(&mut self, slot: u32, place: Option<u32>) {
+    fn activate(&mut self, slot: u32, set_in: u64, place: Option<u32>) {
         let at = place.unwrap_or(self.active.len() as u32);
         self.slots.set_at(slot, At::Active(at));
-        let (aabb, body, update) = (self.slots.boxes()[slot as usize], self.slots.body(slot), self.set_in(slot));
+        let (aabb, body) = (self.slots.boxes()[slot as usize], self.slots.body(slot));
         match place {
-            Some(at) => self.active.replace(at as usize, slot, aabb, body, update),
-            None => self.active.push(slot, aabb, body, update),
+            Some(at) => self.active.replace(at as usize, slot, aabb, body, set_in),
+            None => self.active.push(slot, aabb, body, set_in),
         }
     }
 
@@ -144,7 +140,7 @@ impl Space {
         self.rests = false;
         for slot in 0..self.slots.boxes().len() as u32 {
             if self.slots.at(slot) == At::Resting {
-                self.activate(slot, None);
+                self.activate(slot, self.update, None);
             }
         }
         self.resting.clear();
@@ -156,12 +152,12 @@ impl Space {
     /// Finds the pairs of active bodies.
     fn find(&mut self) -> Result<(), Error> {
         let Self { search, slots, active, resting, neighbours, keys, sorter, .. } = self;
+        resting.update(slots)?;
         let (boxes, pairs) = active.search();
         search.find_pairs(boxes, pairs)?;
         keys.clear();
         let of = active.slots();
         keys.extend(active.pairs().iter().map(|&(a, b)| key(of[a as usize], of[b as usize])));
-        resting.update(slots)?;
         if resting.len() > 0 {
             neighbours.each(resting, slots.boxes(), (of, active.boxes()), |at, other| {
                 let one = of[at];
