@@ -57,6 +57,7 @@ impl Aabb {
     /// Returns the box grown by a margin on every side. It contains this box, because rounding is monotonic.
     ///
     /// A negative margin shrinks the box; one beyond half of an edge inverts it, which every search reports.
+    #[inline]
     #[must_use]
     pub fn grown(self, margin: f32) -> Self {
         Self { min: self.min.map(|v| v - margin), max: self.max.map(|v| v + margin) }

@@ -101,7 +101,8 @@ pub struct Space {
 }
 
 /// A clone goes on as the original would: the same calls give the same lists. It searches with the built-in algorithms
-/// on the CPU, by the same tuning. `clone_from` keeps what searches, as a game that goes back to an earlier state wants:
+/// on the CPU, by the same tuning. `clone_from` keeps what searches, as a game that goes back to an earlier state
+/// wants:
 ///
 /// ```
 /// use sapwise::{Aabb, Body, Space};
@@ -235,10 +236,15 @@ impl Space {
     /// # Errors
     /// [`Error::StaleHandle`], and [`Error::InvalidBody`].
     pub fn set(&mut self, handle: Handle, aabb: Aabb) -> Result<(), Error> {
-        let slot = self.slots.find(handle)?;
-        aabb.defect().map_or(Ok(()), |defect| Err(Error::InvalidBody { handle, defect }))?;
+        let slot = self.check(handle, &aabb)?;
         self.slots.set(slot, aabb);
         Ok(())
+    }
+
+    /// Returns the slot of a body that gets a new box.
+    fn check(&self, handle: Handle, aabb: &Aabb) -> Result<u32, Error> {
+        let slot = self.slots.find(handle)?;
+        aabb.defect().map_or(Ok(slot), |defect| Err(Error::InvalidBody { handle, defect }))
     }
 
     /// Sets the box of each of these bodies.
@@ -250,10 +256,7 @@ impl Space {
     /// If there are not as many boxes as handles.
     pub fn set_all(&mut self, handles: &[Handle], boxes: &[Aabb]) -> Result<(), Error> {
         assert_eq!(handles.len(), boxes.len(), "one box for each handle");
-        for (&handle, aabb) in handles.iter().zip(boxes) {
-            self.slots.find(handle)?;
-            aabb.defect().map_or(Ok(()), |defect| Err(Error::InvalidBody { handle, defect }))?;
-        }
+        handles.iter().zip(boxes).try_for_each(|(&handle, aabb)| self.check(handle, aabb).map(drop))?;
         handles.iter().zip(boxes).for_each(|(handle, &aabb)| self.slots.set(handle.slot(), aabb));
         Ok(())
     }
@@ -309,15 +312,6 @@ impl Space {
     /// Iterates over the handles of all bodies, ascending.
     pub fn handles(&self) -> impl Iterator<Item = Handle> {
         self.slots.handles()
-    }
-
-    /// Finds all pairs, and which began and ended since the previous update.
-    ///
-    /// # Errors
-    /// [`Error::OutOfMemory`] and [`Error::Unavailable`]. Then no pair has begun or ended, the pairs of active bodies
-    /// are missing, and the next update compares with the last one that succeeded.
-    pub fn update(&mut self) -> Result<(), Error> {
-        self.run()
     }
 
     /// Returns the pairs of bodies that overlap and may meet, each once, the lower handle first. Touching bodies

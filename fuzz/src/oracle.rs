@@ -21,7 +21,8 @@ pub fn answer(boxes: &[Aabb], memberships: Option<&[Membership]>, limit: Option<
         return Answer { pairs: Err(Error::InvalidBox { index, defect }), overlapping: 0 };
     }
     let of = |k: usize| {
-        memberships.and_then(|m| m.get(k)).copied().unwrap_or(Membership { groups: !0, mask: !0, fixed: false, owner: 0 })
+        let all = Membership { groups: !0, mask: !0, fixed: false, owner: 0 };
+        memberships.and_then(|m| m.get(k)).copied().unwrap_or(all)
     };
     let mut pairs = Vec::new();
     let mut overlapping = 0;

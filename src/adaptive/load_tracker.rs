@@ -111,8 +111,9 @@ impl LoadTracker {
         self.before.is_none() || rested && self.passed_ns * (SHARE + SHARE_OF_DRIFT * drift) >= self.sample_ns
     }
 
-    /// Takes note of a frame that ran without a decision, the last of those that have `passed`, and of its wanted pairs:
-    /// every algorithm has the same number of them. Unwanted ones that some algorithms find count as their slowness.
+    /// Takes note of a frame that ran without a decision, the last of those that have `passed`, and of its wanted
+    /// pairs: every algorithm has the same number of them. Unwanted ones that some algorithms find count as their
+    /// slowness.
     pub(super) fn passes(&mut self, boxes: &[Aabb], pairs: u64, passed: &Passed) {
         self.throttle.ran(count(boxes), pairs);
         // A look alone takes a tenth of a decision, and most looks find the pace of before.

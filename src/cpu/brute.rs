@@ -62,8 +62,8 @@ impl BroadPhase for Brute {
     }
 }
 
-/// Writes the positions of `count` boxes to `order`: first the active ones, then the [passive](Screen) ones. Returns the
-/// number of active ones, or `None`, and leaves `order` alone, if all are.
+/// Writes the positions of `count` boxes to `order`: first the active ones, then the [passive](Screen) ones. Returns
+/// the number of active ones, or `None`, and leaves `order` alone, if all are.
 fn active_first(order: &mut Vec<u32>, screen: Option<&Screen>, count: usize) -> Result<Option<usize>, Error> {
     let is_passive = |id: usize| screen.is_some_and(|s| s.is_passive(id));
     let passive = screen.map_or(0, |_| (0..count).filter(|&id| is_passive(id)).count());

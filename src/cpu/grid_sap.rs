@@ -14,8 +14,8 @@
 //! has several tasks a thread: for each strip, a task gathers the bins of all threads, sorts them along the sweep axis
 //! and sweeps.
 //!
-//! Oversized boxes, the boxes of overfull strips and [passive](Screen) boxes go into a separate [tree](super::tree). Its
-//! boxes are compared with each other, but for two passive ones, and with the boxes of every strip.
+//! Oversized boxes, the boxes of overfull strips and [passive](Screen) boxes go into a separate [tree](super::tree).
+//! Its boxes are compared with each other, but for two passive ones, and with the boxes of every strip.
 
 use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, check_count};
@@ -247,7 +247,8 @@ impl Bins {
         Ok(())
     }
 
-    /// Takes the boxes of strips with more than `most` boxes out of all their strips, and lists the boxes for the tree.
+    /// Takes the boxes of strips with more than `most` boxes out of all their strips, and lists the boxes for the
+    /// tree.
     fn set_apart(&mut self, grid: &StripGrid, most: u32, first: usize, len: usize) -> Result<(), Error> {
         let Self { starts, spans, apart, apart_count, .. } = self;
         let starts = &mut starts[..grid.strips()];

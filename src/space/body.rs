@@ -48,8 +48,8 @@ impl Body {
         self
     }
 
-    /// Sets what the body is a part of, such as a ragdoll. Bodies with the same owner do not meet. The default is 0, which
-    /// is no owner.
+    /// Sets what the body is a part of, such as a ragdoll. Bodies with the same owner do not meet. The default is 0,
+    /// which is no owner.
     #[must_use]
     pub fn owner(mut self, owner: u32) -> Self {
         self.membership.owner = owner;

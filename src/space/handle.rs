@@ -3,8 +3,8 @@
 use std::fmt;
 use std::num::NonZeroU64;
 
-/// Names a body of a [`Space`](crate::Space), until it is removed. No other body gets the same handle before its slot has
-/// had four billion bodies. Handles of two spaces may be equal: don't mix them.
+/// Names a body of a [`Space`](crate::Space), until it is removed. No other body gets the same handle before its slot
+/// has had four billion bodies. Handles of two spaces may be equal: don't mix them.
 ///
 /// 64 bits: slot, then generation. Handles sort by slot. 0 is no handle, so `Option<Handle>` has 64 bits too.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -34,14 +34,10 @@ impl Links {
             self.first.resize(most + 1, NONE);
         }
         let next = slots.map(|slot| self.first[slot as usize]);
-        self.links.push(Link { slots, previous: [NONE; 2], next });
+        let link = Link { slots, previous: [NONE; 2], next };
+        self.links.push(link);
         list.push(handles);
-        for (slot, next) in slots.into_iter().zip(next) {
-            self.first[slot as usize] = at;
-            if next != NONE {
-                self.previous_of(next, slot, at);
-            }
-        }
+        self.point(&link, [at; 2], [at; 2]);
     }
 
     /// Removes all pairs of a body, and calls `removed` with the slots of each.
@@ -66,45 +62,34 @@ impl Links {
 
     fn remove(&mut self, at: u32, list: &mut Vec<(Handle, Handle)>) {
         let link = self.links[at as usize];
-        for k in 0..2 {
-            let (slot, previous, next) = (link.slots[k], link.previous[k], link.next[k]);
-            if previous == NONE {
-                self.first[slot as usize] = next;
-            } else {
-                self.next_of(previous, slot, next);
-            }
-            if next != NONE {
-                self.previous_of(next, slot, previous);
-            }
-        }
+        self.point(&link, link.next, link.previous);
         // The last pair takes its place.
         self.links.swap_remove(at as usize);
         list.swap_remove(at as usize);
-        let Some(&moved) = self.links.get(at as usize) else { return };
+        if let Some(&moved) = self.links.get(at as usize) {
+            self.point(&moved, [at; 2], [at; 2]);
+        }
+    }
+
+    /// In the lists of both bodies of a pair, lets the pair before it point to `next`, and the one behind to
+    /// `previous`.
+    fn point(&mut self, link: &Link, next: [u32; 2], previous: [u32; 2]) {
         for k in 0..2 {
-            let (slot, previous, next) = (moved.slots[k], moved.previous[k], moved.next[k]);
-            if previous == NONE {
-                self.first[slot as usize] = at;
+            let (slot, before, behind) = (link.slots[k], link.previous[k], link.next[k]);
+            if before == NONE {
+                self.first[slot as usize] = next[k];
             } else {
-                self.next_of(previous, slot, at);
+                let side = self.side(before, slot);
+                self.links[before as usize].next[side] = next[k];
             }
-            if next != NONE {
-                self.previous_of(next, slot, at);
+            if behind != NONE {
+                let side = self.side(behind, slot);
+                self.links[behind as usize].previous[side] = previous[k];
             }
         }
     }
 
     fn side(&self, at: u32, slot: u32) -> usize {
         usize::from(self.links[at as usize].slots[1] == slot)
-    }
-
-    fn next_of(&mut self, at: u32, slot: u32, next: u32) {
-        let side = self.side(at, slot);
-        self.links[at as usize].next[side] = next;
-    }
-
-    fn previous_of(&mut self, at: u32, slot: u32, previous: u32) {
-        let side = self.side(at, slot);
-        self.links[at as usize].previous[side] = previous;
     }
 }

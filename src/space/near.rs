@@ -95,10 +95,9 @@ impl Neighbours {
     }
 }
 
-/// Grows a box. The result contains it, because rounding is monotonic.
+/// Returns the fat AABB of a box.
 fn fat(b: &Aabb) -> Aabb {
     let mean = (0..3).map(|a| b.max[a] - b.min[a]).sum::<f32>() / 3.0;
     // An infinite box is its own fat box.
-    let by = if mean.is_finite() { MARGIN * mean } else { 0.0 };
-    Aabb { min: b.min.map(|v| v - by), max: b.max.map(|v| v + by) }
+    b.grown(if mean.is_finite() { MARGIN * mean } else { 0.0 })
 }

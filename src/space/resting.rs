@@ -6,7 +6,8 @@ use crate::cpu::{GrownTree, Members, Simd, SimdLevel, Tree, Workers};
 use crate::error::Error;
 use crate::load::SceneStats;
 
-/// What it costs to sort a box into a tree, in nodes looked at by queries: 25 and 5 ns on the Zen 3 host of `datasets/`.
+/// What it costs to sort a box into a tree, in nodes looked at by queries: 25 and 5 ns on the Zen 3 host of
+/// `datasets/`.
 const SORT_IN_NODES: u64 = 5;
 
 /// Queries of a fresh tree from which it is learned how many nodes one looks at.

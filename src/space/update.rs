@@ -18,8 +18,12 @@ fn slots(key: u64) -> (u32, u32) {
 }
 
 impl Space {
-    /// Does an update.
-    pub(super) fn run(&mut self) -> Result<(), Error> {
+    /// Finds all pairs, and which began and ended since the previous update.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`] and [`Error::Unavailable`]. Then no pair has begun or ended, the pairs of active bodies
+    /// are missing, and the next update compares with the last one that succeeded.
+    pub fn update(&mut self) -> Result<(), Error> {
         self.update += 1;
         self.tree.take();
         self.pairs.truncate(self.links.len());

@@ -100,6 +100,10 @@ impl Space {
     }
 }
 
+fn check(ray: &Ray) -> Result<(), Error> {
+    ray.defect().map_or(Ok(()), |defect| Err(Error::InvalidRay { defect }))
+}
+
 /// What the ids of a tree are.
 #[derive(Debug, Clone, Copy)]
 enum Ids {
@@ -154,7 +158,8 @@ impl<'a> View<'a> {
         self.query_box(&Aabb::new(point, point), found)
     }
 
-    /// Calls `found` with each body whose box a ray meets, and the `t` at which it enters the box: 0 if it begins there.
+    /// Calls `found` with each body whose box a ray meets, and the `t` at which it enters the box: 0 if it begins
+    /// there.
     ///
     /// `found` returns the highest `t` that still matters: the given `t` to find the first hit, infinity to find all,
     /// a negative number to stop. Hits do not come in the order of `t`.
@@ -162,7 +167,7 @@ impl<'a> View<'a> {
     /// # Errors
     /// [`Error::InvalidRay`] and [`Error::OutOfMemory`].
     pub fn cast_ray(&self, ray: &Ray, found: impl FnMut(Handle, f32) -> f32) -> Result<(), Error> {
-        ray.defect().map_or(Ok(()), |defect| Err(Error::InvalidRay { defect }))?;
+        check(ray)?;
         self.cast(&Aabb::new(ray.origin, ray.origin), ray.direction, ray.max, found)
     }
 
@@ -182,16 +187,17 @@ impl<'a> View<'a> {
         Ok(first)
     }
 
-    /// Calls `found` with each body whose box is met by a box that moves by `motion`, and the share of the motion after
-    /// which they touch: 0 if they overlap at the start. `found` returns what it does for
+    /// Calls `found` with each body whose box is met by a box that moves by `motion`, and the share of the motion
+    /// after which they touch: 0 if they overlap at the start. `found` returns what it does for
     /// [`cast_ray`](Self::cast_ray).
     ///
     /// # Errors
     /// [`Error::InvalidBox`] with index 0, [`Error::InvalidRay`] if the motion is not finite, [`Error::OutOfMemory`].
     pub fn cast_box(&self, aabb: &Aabb, motion: [f32; 3], found: impl FnMut(Handle, f32) -> f32) -> Result<(), Error> {
         Aabb::check(std::slice::from_ref(aabb), 0)?;
-        let defect = Ray::new([0.0; 3], motion).defect().filter(|_| motion != [0.0; 3]);
-        defect.map_or(Ok(()), |defect| Err(Error::InvalidRay { defect }))?;
+        if motion != [0.0; 3] {
+            check(&Ray::new([0.0; 3], motion))?;
+        }
         self.cast(aabb, motion, 1.0, found)
     }
 
@@ -223,8 +229,7 @@ impl<'a> View<'a> {
     /// # Errors
     /// [`Error::InvalidRay`] if the point is not finite, and [`Error::OutOfMemory`].
     pub fn nearest(&self, point: [f32; 3], k: usize) -> Result<Vec<(Handle, f32)>, Error> {
-        let defect = Ray::new(point, [1.0; 3]).defect();
-        defect.map_or(Ok(()), |defect| Err(Error::InvalidRay { defect }))?;
+        check(&Ray::new(point, [1.0; 3]))?;
         let mut all: Vec<(Handle, f32)> = Vec::new();
         let mut near: Vec<Near> = Vec::new();
         for (tree, ids) in self.space.trees()? {

@@ -61,8 +61,8 @@ pub(super) const MOST_LEVELS: usize = 9;
 const EVERY: Range<usize> = 0..usize::MAX;
 
 impl Walk<'_> {
-    /// Calls `found` for every place in the leaves whose box overlaps `b` and, if the tree has marks, is wanted `by` the
-    /// box. Returns the number of nodes compared with it.
+    /// Calls `found` for every place in the leaves whose box overlaps `b` and, if the tree has marks, is wanted `by`
+    /// the box. Returns the number of nodes compared with it.
     #[inline]
     pub(crate) fn each_overlapping(
         &self,

@@ -250,10 +250,9 @@ impl Margin {
         if mean < self.longest_edge { mean } else { self.longest_edge }
     }
 
-    /// Grows a valid box on every side. The result contains the box, because rounding is monotonic.
+    /// Grows a valid box on every side.
     #[inline]
     fn grow(&self, b: &Aabb) -> Aabb {
-        let by = self.share * self.edge(b);
-        Aabb { min: b.min.map(|v| v - by), max: b.max.map(|v| v + by) }
+        b.grown(self.share * self.edge(b))
     }
 }

@@ -22,8 +22,8 @@ const MOST_KEPT: f32 = 32.0;
 /// large then costs as much as a few frames from scratch, where it would cost as much as twenty.
 const KEPT_OVER_PROMISED: f32 = 4.0;
 
-/// Pairs that a box is taken to have at the least when a margin is chosen. Where none overlap yet, boxes may be stacked
-/// a hair apart, and any margin would seem free.
+/// Pairs that a box is taken to have at the least when a margin is chosen. Where none overlap yet, boxes may be
+/// stacked a hair apart, and any margin would seem free.
 const FEWEST_PAIRS: f32 = 0.5;
 
 /// Frames from scratch after keeping did not pay, at first and at most.
@@ -98,7 +98,8 @@ pub(super) struct Motion {
     crowded: bool,
     /// How far they move in this frame, where that was told.
     told: Option<f32>,
-    /// No larger margin is begun with: that one kept too many pairs, of boxes near one another that do not overlap yet.
+    /// No larger margin is begun with: that one kept too many pairs, of boxes near one another that do not overlap
+    /// yet.
     most_margin: f32,
     prices: Prices,
 }
@@ -113,8 +114,8 @@ struct Keeping {
     cost: f32,
     /// What of that the kept pairs took in the last frame.
     tests: f32,
-    /// Share of the boxes that leave in a frame without a jump and kept pairs for each box, averaged over the last [`LEARNING`]
-    /// frames.
+    /// Share of the boxes that leave in a frame without a jump and kept pairs for each box, averaged over the last
+    /// [`LEARNING`] frames.
     leaving: f32,
     kept: f32,
     /// Nodes looked at for each box that left, averaged in the same way.
@@ -155,8 +156,8 @@ impl Keeping {
             - cost::left(far, self.nodes) * more.max(0.0)
     }
 
-    /// Whether it would have saved by now what it costs to grow all boxes again. Boxes that come to rest never leave by
-    /// themselves: without this their wide grown boxes would stay for ever, and with them five times the pairs.
+    /// Whether it would have saved by now what it costs to grow all boxes again. Boxes that come to rest never leave
+    /// by themselves: without this their wide grown boxes would stay for ever, and with them five times the pairs.
     fn is_too_wide(&self, objects: usize) -> bool {
         self.missed > cost::rebuild(cost::far(objects), self.kept * self.narrower_keeps())
     }
@@ -286,8 +287,8 @@ impl Motion {
     /// have changed its sizes since the last time.
     pub(super) fn renew(&mut self, plan: &FramePlan, boxes: &[Aabb], changes: &Changes) -> Margin {
         let jumped = changes.left as f32 > JUMP * boxes.len() as f32;
-        // At the same pace the margin stays, for it was found in many frames: boxes that are only taken from a pool and
-        // put back move as before.
+        // At the same pace the margin stays, for it was found in many frames: boxes that are only taken from a pool
+        // and put back move as before.
         let another = |keeping: Keeping| plan.moved().is_some_and(|now| !is_same_pace(keeping.pace.into(), now));
         if jumped && self.keeping.is_some_and(another) {
             self.keeping = self.begin(plan, boxes).or(self.keeping);

@@ -78,8 +78,8 @@ impl GrownTree {
     }
 
     /// Moves the boxes `far` to new leaves, which have no bounds until [`refit`](Self::refit) sets them; those from
-    /// `new` on are not in the tree yet. Goes on to sort all boxes anew if that has begun or is `wanted`. Returns whether
-    /// they stand in the new order.
+    /// `new` on are not in the tree yet. Goes on to sort all boxes anew if that has begun or is `wanted`. Returns
+    /// whether they stand in the new order.
     pub(crate) fn update(
         &mut self,
         workers: &Workers,
