@@ -14,6 +14,9 @@ use crate::pairs::Pairs;
 /// Pairs that are tested in the time that `grid-sap` takes for a box, in round numbers.
 const PAIRS_PER_BOX: usize = 512;
 
+/// What an error calls the memory of [`Brute::order`].
+const POSITIONS: &str = "positions of boxes";
+
 /// The method; see the module.
 #[derive(Debug)]
 struct Brute {
@@ -58,7 +61,7 @@ impl BroadPhase for Brute {
 
     fn prepare(&mut self, objects: usize) {
         // The frame that needs the memory reports a refused allocation.
-        let _ = self.columns.resize(objects);
+        let _ = self.columns.resize(objects).and_then(|()| ensure(&mut self.order, objects, POSITIONS));
     }
 }
 
@@ -70,7 +73,7 @@ fn active_first(order: &mut Vec<u32>, screen: Option<&Screen>, count: usize) -> 
     if passive == 0 {
         return Ok(None);
     }
-    ensure(order, count, "positions of boxes")?;
+    ensure(order, count, POSITIONS)?;
     let mut next = [0, count - passive];
     for id in 0..count {
         let next = &mut next[usize::from(is_passive(id))];
