@@ -45,6 +45,7 @@
 mod aabb;
 mod adaptive;
 pub mod algorithm;
+mod between;
 mod broad_phase;
 #[cfg(feature = "parallel")]
 mod cgroup;
@@ -77,6 +78,7 @@ mod worlds;
 pub use aabb::Aabb;
 pub use adaptive::{Adaptive, Decision, Reason};
 pub use algorithm::AlgorithmId;
+pub use between::Between;
 pub use broad_phase::BroadPhase;
 pub use changes::Changes;
 pub use error::Error;

@@ -52,8 +52,8 @@ pub(crate) fn sweep_rows<R: Rows>(simd: Simd, columns: &Columns, rows: Range<usi
     }
 }
 
-/// Tests every row of `rows` against all rows behind it, on all three axes, and adds the pairs.
-pub(crate) fn brute_rows(simd: Simd, columns: &Columns, rows: Range<usize>, pairs: &mut Pairs) {
+/// Tests every row of `rows` against all rows behind it, from row `from` on, on all three axes, and adds the pairs.
+pub(crate) fn brute_rows(simd: Simd, columns: &Columns, rows: Range<usize>, from: usize, pairs: &mut Pairs) {
     if pairs.is_any_over() {
         return;
     }
@@ -61,11 +61,11 @@ pub(crate) fn brute_rows(simd: Simd, columns: &Columns, rows: Range<usize>, pair
     match simd {
         // SAFETY: the proof says that this CPU has the instructions.
         #[cfg(target_arch = "x86_64")]
-        Simd::Avx512(proof) => unsafe { x86::brute_avx512(proof, &view, rows, pairs) },
+        Simd::Avx512(proof) => unsafe { x86::brute_avx512(proof, &view, rows, from, pairs) },
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
-        Simd::Avx2(proof) => unsafe { x86::brute_avx2(proof, &view, rows, pairs) },
-        Simd::Portable => brute(Baseline, &view, rows, pairs),
+        Simd::Avx2(proof) => unsafe { x86::brute_avx2(proof, &view, rows, from, pairs) },
+        Simd::Portable => brute(Baseline, &view, rows, from, pairs),
     }
 }
 
@@ -215,11 +215,11 @@ fn sweep<L: Lanes, R: Rows>(lanes: L, view: &View<'_>, rows: Range<usize>, pairs
 }
 
 #[inline(always)]
-fn brute<L: Lanes>(lanes: L, view: &View<'_>, rows: Range<usize>, pairs: &mut Pairs) {
+fn brute<L: Lanes>(lanes: L, view: &View<'_>, rows: Range<usize>, from: usize, pairs: &mut Pairs) {
     debug_assert!(rows.end <= view.len);
     for i in rows {
         let query = view.query(i);
-        let mut at = i + 1;
+        let mut at = from.max(i + 1);
         while at < view.len {
             // SAFETY: `at < view.len`; the caller enabled the instructions of `L`.
             let hits = unsafe { lanes.reach_and_hits(view, at, &query).1 & lanes.ends_after(view, at, query.low[0]) };
@@ -319,7 +319,8 @@ mod tests {
             pairs.set_filter(Some(Filter::new((0..1000).map(ground).collect())));
             pairs
         };
-        for search in [sweep_rows::<All>, brute_rows] {
+        let brute_rows = |simd, columns: &Columns, rows, pairs: &mut Pairs| brute_rows(simd, columns, rows, 0, pairs);
+        for search in [&sweep_rows::<All> as &dyn Fn(Simd, &Columns, Range<usize>, &mut Pairs), &brute_rows] {
             let mut pairs = whole.clone();
             search(Simd::Portable, &columns, 0..1000, &mut pairs);
             assert!(pairs.is_over() && pairs.overlapping() == 10, "{}", pairs.overlapping());
@@ -353,7 +354,7 @@ mod tests {
         let view = View::new(&columns);
         let (mut swept, mut tested) = (Pairs::new(), Pairs::new());
         sweep::<_, All>(portable::Portable, &view, 0..boxes.len(), &mut swept);
-        brute(portable::Portable, &view, 0..boxes.len(), &mut tested);
+        brute(portable::Portable, &view, 0..boxes.len(), 0, &mut tested);
         assert_eq!(swept.fingerprint(), expected.fingerprint());
         assert_eq!(tested.fingerprint(), expected.fingerprint());
     }

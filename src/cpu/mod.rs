@@ -21,9 +21,11 @@ mod tree;
 mod workers;
 mod world;
 
-pub(crate) use columns::part;
+pub(crate) use columns::{Columns, part};
 #[cfg(feature = "parallel")]
 pub use helpers::pinned_pool;
+pub(crate) use kernel::brute_rows;
+pub(crate) use kernel::node::{Group, LANES};
 pub(crate) use level::Simd;
 pub use level::{SimdLevel, SimdLevelError};
 pub(crate) use pair_cache::GrownTree;

@@ -409,6 +409,18 @@ impl Tree {
         Walk { levels: &self.levels, ids: &self.ids, far: self.ids.len() > FAR, apart: self.sweeps.apart(), marks }
     }
 
+    /// Sorts boxes that are not in the tree along its curve. Until it is built again, [`others`](Self::others) returns
+    /// them.
+    pub(crate) fn sort_others(&mut self, workers: &Workers, boxes: &[Aabb]) -> Result<(), Error> {
+        let curve = self.curve.take().unwrap_or_else(|| Curve::over(&SceneStats::of(boxes), boxes.len()));
+        self.order.sort(workers, boxes, Members::From(0), &curve, None).map(drop)
+    }
+
+    /// Returns the sorted boxes: their positions are in the lower halves.
+    pub(crate) fn others(&self) -> &[u64] {
+        self.order.ids()
+    }
+
     /// Returns the box at each place: place `p` is lane `p % 16` of leaf `p / 16`.
     pub(crate) fn ids(&self) -> &[u32] {
         &self.ids

@@ -8,7 +8,7 @@ use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::prelude::*;
 use sapwise::tuning::Step;
-use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Filter, Membership, PairOrder, Pairs, Registry, Tuning};
+use sapwise::{Aabb, Adaptive, AlgorithmId, Between, BroadPhase, Error, PairOrder, Pairs, Registry, Tuning};
 use sapwise_tune::StartOptions;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -27,12 +27,12 @@ const MOST_PAIRS_KEPT: usize = 16_000_000;
 /// Most engines that are kept: one for each of so many threads that call at once.
 const MOST_KEPT: usize = 8;
 
-/// A broad phase with its lists of pairs, used by one call at a time.
+/// What searches, with its lists of pairs, used by one call at a time.
 struct Engine {
     adaptive: Adaptive,
+    between: Between,
     /// The list in any order, and the one in canonical order.
     pairs: [Option<Pairs>; 2],
-    both: Vec<Aabb>,
 }
 
 /// Engines that no call uses. Locked only by a thread with the interpreter's lock, and for an instant: no fork finds it
@@ -71,38 +71,33 @@ impl Engine {
         tuning.costs.retain(|cost| cost.algorithm.method() != INCREMENTAL);
         let mut adaptive = Adaptive::new(if tuning.costs.is_empty() { usual(&registry)? } else { tuning }, &registry)?;
         adaptive.set_exploring(false);
-        Ok(Self { adaptive, pairs: [None, None], both: Vec::new() })
+        Ok(Self { adaptive, between: Between::new(&registry)?, pairs: [None, None] })
     }
 
-    /// Finds the pairs and returns them flat, as in NumPy.
-    fn find(&mut self, boxes: Option<&[Aabb]>, order: PairOrder, wants: Wants) -> Result<Vec<u32>, Error> {
-        let pairs =
-            self.pairs[usize::from(order == PairOrder::Canonical)].get_or_insert_with(|| start::pairs(order, None));
+    /// Lets `find` search, and returns the pairs flat, as in NumPy. `from_second` is subtracted from the second member
+    /// of each pair.
+    fn find(
+        &mut self,
+        order: PairOrder,
+        limit: Option<usize>,
+        from_second: u32,
+        find: impl FnOnce(&mut Adaptive, &mut Between, &mut Pairs) -> Result<(), Error>,
+    ) -> Result<Vec<u32>, Error> {
+        let Self { adaptive, between, pairs } = self;
+        let pairs = pairs[usize::from(order == PairOrder::Canonical)].get_or_insert_with(|| start::pairs(order, None));
         let usual_limit = pairs.limit();
-        if wants.limit.is_some() {
-            pairs.set_limit(wants.limit);
+        if limit.is_some() {
+            pairs.set_limit(limit);
         }
-        pairs.set_filter(wants.filter);
-        let found = self.adaptive.find_pairs(boxes.unwrap_or(&self.both), pairs);
-        pairs.set_filter(None);
+        let found = find(adaptive, between, pairs);
         pairs.set_limit(usual_limit);
         found?;
-        flat(pairs, wants.from_second)
+        flat(pairs, from_second)
     }
 
     fn is_small(&self) -> bool {
-        let pairs = self.pairs.iter().flatten().map(Pairs::len).sum::<usize>();
-        self.both.capacity() <= MOST_BOXES_KEPT && pairs <= MOST_PAIRS_KEPT
+        self.pairs.iter().flatten().map(Pairs::len).sum::<usize>() <= MOST_PAIRS_KEPT
     }
-}
-
-/// The wishes of a call.
-#[derive(Default)]
-struct Wants {
-    limit: Option<usize>,
-    filter: Option<Filter>,
-    /// Subtracted from the second member of each pair.
-    from_second: u32,
 }
 
 /// Returns the built-in thresholds, without incremental algorithms.
@@ -228,15 +223,16 @@ pub(crate) fn pairs<'py>(
     let py = boxes.py();
     let given = crate::boxes::boxes(boxes, upper, "")?;
     let boxes = given.as_slice()?;
-    let wants = Wants { limit, ..Wants::default() };
-    let find = |engine: &mut Engine| engine.find(Some(boxes), start::order(ordered), wants);
+    let find = |engine: &mut Engine| {
+        engine.find(start::order(ordered), limit, 0, |adaptive, _, pairs| adaptive.find_pairs(boxes, pairs))
+    };
     with_engine(py, boxes.len(), find, |error| exception(py, &error, ""))
 }
 
 /// Find all pairs of a box of ``a`` and an overlapping box of ``b``.
 ///
-/// Pairs within the longer list are not searched; those within the shorter list are found and dropped. Both lists are
-/// copied into one.
+/// The shorter list is put into a tree, which is searched for each box of the longer one. Pairs within a list are not
+/// searched.
 ///
 /// Parameters
 /// ----------
@@ -287,19 +283,7 @@ pub(crate) fn pairs_between<'py>(
         return Err(exception(py, &Error::TooManyObjects { objects }, ""));
     };
     let find = |engine: &mut Engine| {
-        let refused = |_| Error::OutOfMemory { what: "boxes", elements: objects };
-        engine.both.clear();
-        engine.both.try_reserve_exact(objects).map_err(refused)?;
-        engine.both.extend_from_slice(a);
-        engine.both.extend_from_slice(b);
-        // Most methods never compare two fixed boxes: that saves the search within the longer list, most of the work.
-        let of = |groups, mask, fixed| Membership { groups, mask, fixed, owner: 0 };
-        let (in_a, in_b) = (of(0b01, 0b10, a.len() > b.len()), of(0b10, 0b01, a.len() <= b.len()));
-        let mut memberships = Vec::new();
-        memberships.try_reserve_exact(objects).map_err(refused)?;
-        memberships.extend(a.iter().map(|_| in_a).chain(b.iter().map(|_| in_b)));
-        let wants = Wants { limit, filter: Some(Filter::new(memberships)), from_second };
-        engine.find(None, start::order(ordered), wants)
+        engine.find(start::order(ordered), limit, from_second, |_, between, pairs| between.find_pairs(a, b, pairs))
     };
     with_engine(py, objects, find, |error| match error {
         Error::InvalidBox { index, defect } if index < first => crate::error::invalid_box(py, " of a", index, defect),
@@ -308,7 +292,7 @@ pub(crate) fn pairs_between<'py>(
     })
 }
 
-/// Tell what the last call of ``pairs`` or ``pairs_between`` chose and why.
+/// Tell what the last call of ``pairs`` chose and why.
 ///
 /// Returns
 /// -------

@@ -1,0 +1,82 @@
+//! Pairs between two lists, against the double loop.
+
+mod common;
+
+use common::{Random, naive_filtered};
+use sapwise::algorithm::SimdLevel;
+use sapwise::{Aabb, Between, Error, Filter, Membership, PairOrder, Pairs, Registry};
+
+/// Returns a search at every SIMD level, on one thread and on two.
+fn every_search() -> Vec<(String, Between)> {
+    let mut all = Vec::new();
+    for level in SimdLevel::ALL.into_iter().filter(|&l| l <= SimdLevel::detected()) {
+        for cores in [1, 2] {
+            let mut registry = Registry::with_cores(cores);
+            registry.limit_simd(level);
+            all.push((format!("{level}, {cores} threads"), Between::new(&registry).unwrap()));
+        }
+    }
+    all
+}
+
+#[test]
+fn pairs_are_those_of_the_double_loop() {
+    let mut random = Random(5);
+    let mut searches = every_search();
+    let mut pairs = Pairs::with_order(PairOrder::Canonical);
+    let inf = f32::INFINITY;
+    for (few, many) in [(0, 0), (0, 100), (1, 1), (1, 5000), (17, 40), (300, 4000), (10_000, 12_000)] {
+        let side = (4.0 * many as f32).cbrt();
+        let mut a = random.cubes(few, [side; 3], 0.5);
+        let mut b = random.cubes(many, [side; 3], 0.5);
+        if few > 5 {
+            // Boxes that touch, that are alike, and that are infinite.
+            b[2] = a[4];
+            b[3] = Aabb::new(a[5].max, a[5].max);
+            a[1] = Aabb::new([-inf; 3], [inf; 3]);
+            b[1] = Aabb::new([-inf, 0.0, 0.0], [0.0, inf, 1.0]);
+        }
+        let membership = |k: usize| Membership { owner: (k % 3) as u32, fixed: k.is_multiple_of(2), ..Membership::ALL };
+        let filter = Filter::new((0..few + many).map(membership).collect());
+        let both: Vec<Aabb> = a.iter().chain(&b).copied().collect();
+        for filter in [None, Some(filter)] {
+            let memberships = filter.as_ref().map_or(&[][..], |filter| &filter.memberships);
+            let between = |&(i, j): &(u32, u32)| (i as usize) < few && few <= j as usize;
+            let expected: Vec<_> = naive_filtered(&both, memberships).into_iter().filter(between).collect();
+            pairs.set_filter(filter.clone());
+            for (name, search) in &mut searches {
+                search.find_pairs(&a, &b, &mut pairs).unwrap();
+                assert_eq!(pairs.as_slice(), expected, "{few} and {many}, {name}");
+                // The longer list first.
+                let swapped = |&(i, j): &(u32, u32)| (j - few as u32, i + many as u32);
+                if filter.is_none() {
+                    search.find_pairs(&b, &a, &mut pairs).unwrap();
+                    let mut expected: Vec<_> = expected.iter().map(swapped).collect();
+                    expected.sort_unstable();
+                    assert_eq!(pairs.as_slice(), expected, "{many} and {few}, {name}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn errors_count_on_from_the_first_list_to_the_second() {
+    let boxes = Random(3).cubes(50, [9.0; 3], 0.5);
+    let mut invalid = boxes.clone();
+    invalid[7].min[1] = f32::NAN;
+    let mut pairs = Pairs::new();
+    for (_, mut search) in every_search() {
+        let mut index = |a: &[Aabb], b: &[Aabb]| match search.find_pairs(a, b, &mut pairs) {
+            Err(Error::InvalidBox { index, .. }) => index,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(
+            [index(&invalid, &boxes), index(&boxes, &invalid), index(&boxes[..2], &invalid), index(&invalid, &[])],
+            [7, 57, 9, 7]
+        );
+        pairs.set_limit(Some(3));
+        assert_eq!(search.find_pairs(&boxes, &boxes, &mut pairs), Err(Error::TooManyPairs { limit: 3 }));
+        pairs.set_limit(None);
+    }
+}
