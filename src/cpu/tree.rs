@@ -74,8 +74,8 @@ pub struct Tree {
     renewal: Option<Renewal>,
     /// Boxes that are being inserted.
     inserted: Vec<u64>,
-    /// Codes at which the active leaves began when they were sorted.
-    starts: Vec<u32>,
+    /// The leaves into which boxes are inserted, ascending: the code at which each began, and its number.
+    leaves: Vec<(u32, u32)>,
     simd: Simd,
 }
 
@@ -121,7 +121,7 @@ impl Tree {
             curve: None,
             renewal: None,
             inserted: Vec::new(),
-            starts: Vec::new(),
+            leaves: Vec::new(),
             simd,
         }
     }
@@ -162,19 +162,25 @@ impl Tree {
     }
 
     /// Sorts all boxes anew, in several calls of which none takes long. Returns whether they stand in the new order
-    /// now, but for those that are `out` of the tree. If the number of boxes has changed since the last call, this
-    /// begins again.
+    /// now, but for those that are `out` of the tree: the ones that have `jumped` since the last call, and new ones. If
+    /// the number of boxes has changed since the last call, this begins again.
     pub(crate) fn renew(
         &mut self,
         workers: &Workers,
         boxes: &[Aabb],
-        out: impl Fn(u32) -> bool + Sync,
+        (jumped, out): (impl Iterator<Item = u32>, impl Fn(u32) -> bool + Sync),
         stats: impl FnOnce() -> SceneStats,
         screen: Option<&Screen>,
     ) -> Result<bool, Error> {
         let (len, all) = (boxes.len(), Members::From(0));
         let begin = || Renewal { curve: Curve::over(&stats(), len), boxes: len, step: 0, active: 0 };
         let mut renewal = self.renewal.take().filter(|renewal| renewal.boxes == len).unwrap_or_else(begin);
+        if renewal.step <= RENEWAL_PARTS {
+            // Those that were coded before they jumped.
+            let known = part(len, renewal.step, RENEWAL_PARTS).start;
+            let jumped = jumped.filter(|&id| (id as usize) < known);
+            jumped.for_each(|id| self.order.code_again(id, boxes, &renewal.curve, screen));
+        }
         match renewal.step {
             step @ 0..RENEWAL_PARTS => {
                 if step == 0 {
@@ -228,8 +234,8 @@ impl Tree {
             Kind { long: *long, leaves: (at.start + by).div_ceil(LANES)..(at.end + by) / LANES }
         }));
         self.fill(workers, boxes, |_, _| true);
-        self.starts.clear();
-        self.starts.extend_from_slice(self.order.starts());
+        self.leaves.clear();
+        self.leaves.extend(self.order.starts().iter().copied().zip(0..));
         (self.curve, self.renewal) = (Some(curve), None);
         self.mark(workers, screen)
     }
@@ -426,8 +432,8 @@ impl Tree {
         &self.ids
     }
 
-    /// Adds boxes: to empty lanes near their place on the curve, else behind all others. They have no bounds yet. Calls
-    /// `placed` with the place and the id of each.
+    /// Adds boxes, which have no bounds yet: to empty lanes near their place on the curve, else to new leaves, whose
+    /// other lanes are for those that follow. Calls `placed` with the place and the id of each.
     pub(crate) fn insert(
         &mut self,
         boxes: &[Aabb],
@@ -444,27 +450,44 @@ impl Tree {
             curve.recode(&mut self.inserted, boxes);
             self.inserted.sort_unstable();
         }
-        // What jumps while a renewal goes on has its old code there.
-        if let Some(renewal) = self.renewal.as_ref().filter(|renewal| renewal.step <= RENEWAL_PARTS) {
-            let known = part(renewal.boxes, renewal.step, RENEWAL_PARTS).start;
-            let ids = self.inserted.iter().map(|&key| key as u32).filter(|&id| (id as usize) < known);
-            ids.for_each(|id| self.order.code_again(id, boxes, &renewal.curve, screen));
-        }
-        let mut behind = 0;
+        let sorted = self.leaves.len();
+        // Where the last new leaf belongs.
+        let mut last = None;
         for at in 0..self.inserted.len() {
-            let key = self.inserted[at];
-            if let Some(place) = self.free_place_near((key >> 32) as u32) {
-                self.ids[place] = key as u32;
-                placed(place, key as u32);
-                self.widen_marks(place, key as u32, screen);
-            } else {
-                self.inserted[behind] = key;
-                behind += 1;
-            }
+            let (code, id) = ((self.inserted[at] >> 32) as u32, self.inserted[at] as u32);
+            let near = self.leaves[..sorted].partition_point(|&(start, _)| start <= code).saturating_sub(1);
+            let new = last.is_some_and(|last| near <= last + 2).then(|| self.leaves.len() - 1);
+            let around = [near, near + 1, near.wrapping_sub(1), near + 2].into_iter().filter(|&leaf| leaf < sorted);
+            let place = match around.chain(new).find_map(|leaf| self.free_place(leaf)) {
+                Some(place) => place,
+                None => {
+                    last = Some(near);
+                    self.add_leaf(code)?
+                }
+            };
+            self.ids[place] = id;
+            placed(place, id);
+            self.widen_marks(place, id, screen);
         }
-        let places = (self.places + behind).next_multiple_of(LANES);
-        grow(&mut self.ids, places, NOBODY)?;
-        let mut nodes = places / LANES;
+        if last.is_some() {
+            // Two runs, which the sort joins.
+            self.leaves.sort();
+        }
+        Ok(())
+    }
+
+    /// Returns an empty lane of the leaf at this position of `leaves`.
+    fn free_place(&self, leaf: usize) -> Option<usize> {
+        let first = self.leaves[leaf].1 as usize * LANES;
+        (first..first + LANES).find(|&place| self.ids[place] == NOBODY)
+    }
+
+    /// Adds a leaf behind all others, and to the end of `leaves`. Returns its first place.
+    fn add_leaf(&mut self, code: u32) -> Result<usize, Error> {
+        let first = self.ids.len();
+        self.places = first + LANES;
+        grow(&mut self.ids, self.places, NOBODY)?;
+        let mut nodes = self.places / LANES;
         // The last level grows beyond 16 nodes, so that no level has to be added.
         for level in self.levels.iter_mut().take_while(|level| !level.is_empty()) {
             grow(level, nodes, Node::EMPTY)?;
@@ -473,24 +496,8 @@ impl Tree {
         for (marks, level) in self.marks.iter_mut().zip(&self.levels) {
             grow(marks, level.len(), Marks::EMPTY)?;
         }
-        for at in 0..behind {
-            let id = self.inserted[at] as u32;
-            self.ids[self.places] = id;
-            placed(self.places, id);
-            self.widen_marks(self.places, id, screen);
-            self.places += 1;
-        }
-        Ok(())
-    }
-
-    /// Returns an empty lane near a code, in one of the leaves that were sorted.
-    fn free_place_near(&self, code: u32) -> Option<usize> {
-        let leaf = self.starts.partition_point(|&start| start <= code).saturating_sub(1);
-        let near =
-            [leaf, leaf + 1, leaf.wrapping_sub(1), leaf + 2].into_iter().filter(|&leaf| leaf < self.starts.len());
-        // Lanes from `places` on are for those behind all others.
-        near.flat_map(|leaf| leaf * LANES..(leaf + 1) * LANES)
-            .find(|&place| place < self.places && self.ids[place] == NOBODY)
+        self.leaves.push((code, (first / LANES) as u32));
+        Ok(first)
     }
 
     fn widen_marks(&mut self, place: usize, id: u32, screen: Option<&Screen>) {

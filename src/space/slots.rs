@@ -23,6 +23,9 @@ const SET: u8 = 1;
 pub(super) const SET_BODY: u8 = 2;
 pub(super) const REMOVED: u8 = 4;
 
+/// If more than one slot in this many has changed, all are looked at.
+const MANY_CHANGED: usize = 8;
+
 #[derive(Debug, Clone, Copy)]
 struct Slot {
     generation: u32,
@@ -155,7 +158,14 @@ impl Slots {
     /// Takes the slots to which something was done. [`take_done`](Self::take_done) of each, then
     /// [`give_back`](Self::give_back) follow.
     pub(super) fn take_changes(&mut self) -> Vec<u32> {
-        std::mem::take(&mut self.changed)
+        let mut changed = std::mem::take(&mut self.changed);
+        if changed.len() > self.slots.len() / MANY_CHANGED {
+            // Memory is read in order then, in whatever order the caller went.
+            let slots = (0..).zip(&self.slots);
+            changed.clear();
+            changed.extend(slots.filter(|(_, of)| of.done != 0).map(|(slot, _)| slot));
+        }
+        changed
     }
 
     /// Returns what was done to a body. That a body was removed stays known until [`free`](Self::free).

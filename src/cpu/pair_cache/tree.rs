@@ -95,7 +95,8 @@ impl GrownTree {
         if wanted || self.tree.is_being_renewed() {
             far.clone().for_each(|id| self.out[id as usize / 64] |= 1 << (id % 64));
             let out = |id: u32| self.out[id as usize / 64] >> (id % 64) & 1 == 1;
-            let done = self.tree.renew(workers, boxes, out, || SceneStats::of(boxes), screen);
+            let jumped = (far.clone(), out);
+            let done = self.tree.renew(workers, boxes, jumped, || SceneStats::of(boxes), screen);
             far.clone().for_each(|id| self.out[id as usize / 64] = 0);
             renewed = done?;
             if renewed {
@@ -229,5 +230,40 @@ impl GrownTree {
     #[inline]
     pub(crate) fn overlapping(&self, bounds: &Aabb, by: impl FnOnce() -> Membership, found: impl FnMut(u32)) -> u32 {
         self.tree.overlapping_wanted(bounds, by, found)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::splitmix::mix;
+
+    #[test]
+    fn tree_renewed_while_boxes_jump_is_as_good_as_a_new_one() {
+        let mut random = 0;
+        let mut below = |n: u64| {
+            random += 1;
+            (mix(random) >> 20) % n
+        };
+        let mut anywhere = |_: u32| Aabb::cube([0; 3].map(|_| below(3000) as f32 * 0.01), 0.5);
+        let mut boxes: Vec<Aabb> = (0..4000).map(&mut anywhere).collect();
+        let (workers, mut tree) = (Workers::one(), GrownTree::new(Simd::Portable));
+        let nodes = |tree: &GrownTree, boxes: &[Aabb]| -> u32 {
+            boxes.iter().map(|b| tree.inner().overlapping(b, |_| {})).sum()
+        };
+        tree.build(&workers, &boxes, Members::From(0), &SceneStats::of(&boxes), None).unwrap();
+        let new = nodes(&tree, &boxes);
+        for frame in 0.. {
+            let jumped: Vec<u32> = (frame..4000).step_by(100).collect();
+            jumped.iter().for_each(|&id| boxes[id as usize] = anywhere(id));
+            let far = (jumped.iter().copied(), boxes.len());
+            let renewed = tree.update(&workers, &boxes, far, None, frame == 0).unwrap();
+            tree.refit(&workers, &boxes, std::iter::once(&jumped[..])).unwrap();
+            if renewed {
+                break;
+            }
+        }
+        let renewed = nodes(&tree, &boxes);
+        assert!(f64::from(renewed) < 1.2 * f64::from(new), "{new} nodes, {renewed} after the renewal");
     }
 }
