@@ -233,8 +233,8 @@ impl<'a> View<'a> {
         let mut all: Vec<(Handle, f32)> = Vec::new();
         let mut near: Vec<Near> = Vec::new();
         for (tree, ids) in self.space.trees()? {
-            tree.nearest(point, k, f32::INFINITY, |id| self.wanted(ids, id).is_some(), &mut near);
-            all.extend(near.iter().filter_map(|near| Some((self.wanted(ids, near.id)?, near.distance))));
+            tree.nearest(point, k, f32::INFINITY, |id| self.wanted(ids, id).map(Handle::slot), &mut near);
+            all.extend(near.iter().map(|near| (self.space.slots.handle(near.id), near.distance)));
         }
         all.sort_unstable_by(|(a, one), (b, other)| one.total_cmp(other).then(a.cmp(b)));
         all.truncate(k);

@@ -16,7 +16,7 @@ use std::collections::BinaryHeap;
 pub struct Near {
     /// The distance from the point to the box, 0 inside.
     pub distance: f32,
-    /// The position of the box in the input.
+    /// The name of the box.
     pub id: u32,
 }
 
@@ -83,8 +83,9 @@ impl Tree {
         self.walk().nearest_first(self.simd, Cast::new(b, motion), max.min(f32::MAX), found);
     }
 
-    /// Writes the `k` boxes nearest to a point to `nearest`, ascending: of those that are `wanted`, at a distance of at
-    /// most `max_distance`. Coordinates of the point must be finite. Fewer boxes are written if there are fewer.
+    /// Writes the `k` boxes nearest to a point to `nearest`, ascending: of those at a distance of at most
+    /// `max_distance` for whose position in the input `name` returns a name. Coordinates of the point must be finite.
+    /// Fewer boxes are written if there are fewer.
     ///
     /// Distances are rounded: the root of the sum of squares in `f32`. Allocates only if `nearest` has no capacity for
     /// `k` boxes.
@@ -94,7 +95,7 @@ impl Tree {
         point: [f32; 3],
         k: usize,
         max_distance: f32,
-        wanted: impl Fn(u32) -> bool,
+        name: impl Fn(u32) -> Option<u32>,
         nearest: &mut Vec<Near>,
     ) {
         nearest.clear();
@@ -104,14 +105,12 @@ impl Tree {
         // The farthest is on top.
         let mut heap = BinaryHeap::from(std::mem::take(nearest));
         self.walk().nearest_first(self.simd, Distance(point), max_distance, |place, distance| {
-            let near = Near { distance, id: self.ids[place] };
             if heap.len() < k {
-                if wanted(near.id) {
-                    heap.push(near);
-                }
+                heap.extend(name(self.ids[place]).map(|id| Near { distance, id }));
             } else if let Some(mut farthest) = heap.peek_mut()
+                && distance <= farthest.distance
+                && let Some(near) = name(self.ids[place]).map(|id| Near { distance, id })
                 && near < *farthest
-                && wanted(near.id)
             {
                 *farthest = near;
             }
