@@ -1,18 +1,26 @@
 //! The box, the input of every algorithm.
 
+#[cfg(feature = "serde")]
+mod bounds;
+
 use crate::error::{BoxDefect, Error};
 
 /// An axis-aligned bounding box, closed on every side: boxes that touch overlap.
 ///
 /// 24 bytes, minimum then maximum, so that a `&[f32]` of shape `n x 6` has the same layout. Bounds may be infinite. A
 /// box is valid if no bound is NaN and no minimum lies above its maximum.
+///
+/// With the feature `serde`, infinite bounds are the strings `inf` and `-inf` in formats for humans, such as JSON.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::Pod, bytemuck::Zeroable))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(C)]
 pub struct Aabb {
     /// Lowest x, y and z.
+    #[cfg_attr(feature = "serde", serde(with = "bounds"))]
     pub min: [f32; 3],
     /// Highest x, y and z.
+    #[cfg_attr(feature = "serde", serde(with = "bounds"))]
     pub max: [f32; 3],
 }
 
@@ -166,6 +174,25 @@ mod tests {
         assert_eq!(Aabb::from_f64([1.0e39; 3], [1.0e39; 3]), Aabb::new([f32::MAX; 3], [f32::INFINITY; 3]));
         assert_eq!(Aabb::from_f64([f64::NAN; 3], [1.0; 3]).defect(), Some(BoxDefect::NotANumber));
         assert_eq!(Aabb::from_f64([0.0; 3], [-1.0e-60; 3]), Aabb::new([0.0; 3], [-0.0; 3]));
+    }
+
+    /// Positions on a chromosome take 28 bits.
+    #[test]
+    fn boxes_of_large_integers_are_exact_near_an_origin() {
+        let start = |k: u64| f64::from(248_000_000 + (crate::splitmix::mix(k) % 20_000) as u32);
+        let interval = |k: u64, origin: f64| {
+            let low = start(k) - origin;
+            Aabb::from_f64([low, 0.0, 0.0], [low + (k % 500) as f64, 0.0, 0.0])
+        };
+        let (mut all, mut gained) = (0, 0);
+        for (i, j) in (0..200).flat_map(|j| (0..j).map(move |i| (i, j))) {
+            let meet = start(i) <= start(j) + (j % 500) as f64 && start(j) <= start(i) + (i % 500) as f64;
+            let far = interval(i, 0.0).overlaps(&interval(j, 0.0));
+            assert_eq!(interval(i, 248_000_000.0).overlaps(&interval(j, 248_000_000.0)), meet);
+            assert!(far || !meet);
+            (all, gained) = (all + usize::from(meet), gained + usize::from(far && !meet));
+        }
+        assert!(all > 50 && gained > 0);
     }
 
     #[test]

@@ -8,6 +8,7 @@ pub(crate) use screen::Screen;
 
 /// The groups and the mask of a box, as in most physics engines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Membership {
     /// The groups of the box, one bit each. Bullet calls them a group, rapier and avian memberships, Godot a layer.
     pub groups: u32,

@@ -36,7 +36,7 @@
 //! # Features
 //!
 //! - `parallel` (default): algorithms on several cores, with rayon. Without it only `@cpu1`, and no dependency.
-//! - `serde`: tunings can be serialised.
+//! - `serde`: tunings, and a [`Space`] with all that is in it, can be serialised.
 //! - `tracing`: an event for each switch of `Adaptive`, with its reason.
 //! - `schema`, `bytemuck`, `long-tests`: for the other crates of this repository and its tests.
 

@@ -12,6 +12,8 @@ mod links;
 mod near;
 mod resting;
 mod slots;
+#[cfg(feature = "serde")]
+mod snapshot;
 #[cfg(test)]
 mod tests;
 mod update;
@@ -136,7 +138,7 @@ impl Clone for Space {
         self.ended.clone_from(&other.ended);
         self.neighbours.clear();
         self.tree.take();
-        self.resting.begin(&self.slots);
+        self.resting.begin(&mut self.slots);
     }
 }
 

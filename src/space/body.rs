@@ -11,6 +11,7 @@ use crate::filter::Membership;
 /// let player = Body::default().groups(1).masks(6).user_data(42);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Body {
     pub(super) membership: Membership,
     /// Whether it is expected to move, although it counts as fixed for the filter.

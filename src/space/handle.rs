@@ -6,8 +6,10 @@ use std::num::NonZeroU64;
 /// Names a body of a [`Space`](crate::Space), until it is removed. No other body gets the same handle before its slot
 /// has had four billion bodies. Handles of two spaces may be equal: don't mix them.
 ///
-/// 64 bits: slot, then generation. Handles sort by slot. 0 is no handle, so `Option<Handle>` has 64 bits too.
+/// 64 bits: slot, then generation. Handles sort by slot. 0 is no handle, so `Option<Handle>` has 64 bits too. With the
+/// feature `serde`, a handle is this number.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Handle(NonZeroU64);
 
 impl Handle {

@@ -19,6 +19,8 @@ pub(super) struct Links {
     links: Vec<Link>,
     /// The first pair of each slot.
     first: Vec<u32>,
+    /// The pairs that are being removed.
+    removed: Vec<u32>,
 }
 
 impl Links {
@@ -40,18 +42,27 @@ impl Links {
         self.point(&link, [at; 2], [at; 2]);
     }
 
-    /// Removes all pairs of a body, and calls `removed` with the slots of each.
+    /// Removes all pairs of a body, and calls `removed` with the slots of each. The order of `list` afterwards depends
+    /// only on the order before.
     pub(super) fn remove_all(
         &mut self,
         slot: u32,
         list: &mut Vec<(Handle, Handle)>,
         mut removed: impl FnMut(u32, u32),
     ) {
-        while let Some(&at) = self.first.get(slot as usize).filter(|&&at| at != NONE) {
+        let mut all = std::mem::take(&mut self.removed);
+        let mut at = self.first.get(slot as usize).copied().unwrap_or(NONE);
+        while at != NONE {
+            all.push(at);
+            at = self.links[at as usize].next[self.side(at, slot)];
+        }
+        all.sort_unstable_by(|a, b| b.cmp(a));
+        for at in all.drain(..) {
             let [a, b] = self.links[at as usize].slots;
             removed(a, b);
             self.remove(at, list);
         }
+        self.removed = all;
     }
 
     /// Removes all pairs. Returns their slots.

@@ -79,12 +79,14 @@ impl Resting {
         (self.len, self.is_built) = (0, false);
     }
 
-    /// Holds the resting ones of other bodies than before.
-    pub(super) fn begin(&mut self, slots: &Slots) {
+    /// Holds the resting ones of other bodies than before, with their boxes at the last update.
+    pub(super) fn begin(&mut self, slots: &mut Slots) {
         self.clear();
         self.len = slots.resting().count();
+        slots.exchange_replaced();
         // Without memory for the tree, the next update reports the error.
         let _ = self.update(slots);
+        slots.exchange_replaced();
     }
 
     /// Puts the arrivals into the tree.

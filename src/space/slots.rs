@@ -47,6 +47,8 @@ pub(super) struct Slots {
     leaving: Vec<u32>,
     /// Slots to which something was done since the last update, each once.
     changed: Vec<u32>,
+    /// The boxes that the resting bodies which were set since had at the last update.
+    replaced: Vec<(u32, Aabb)>,
     /// Number of bodies.
     len: usize,
 }
@@ -116,22 +118,34 @@ impl Slots {
 
     /// Inserts a body whose box is valid. There must be room.
     pub(super) fn insert(&mut self, aabb: Aabb, body: Body) -> Handle {
-        let slot = self.free.pop().unwrap_or_else(|| {
-            self.slots.push(Slot { generation: 1, at: At::Free, done: 0, rests_at_once: false });
-            self.boxes.push(aabb);
-            self.bodies.push(body);
-            (self.boxes.len() - 1) as u32
-        });
+        let slot = self.free.pop().unwrap_or_else(|| self.push(1));
+        self.occupy(slot, aabb, body);
+        self.handle(slot)
+    }
+
+    /// Adds a slot without a body.
+    pub(super) fn push(&mut self, generation: u32) -> u32 {
+        self.slots.push(Slot { generation, at: At::Free, done: 0, rests_at_once: false });
+        self.boxes.push(Aabb::default());
+        self.bodies.push(Body::default());
+        (self.boxes.len() - 1) as u32
+    }
+
+    /// Puts a new body into a slot without one.
+    pub(super) fn occupy(&mut self, slot: u32, aabb: Aabb, body: Body) {
         self.slots[slot as usize].at = At::New;
         self.boxes[slot as usize] = aabb;
         self.len += 1;
         self.set_body(slot, body);
-        self.handle(slot)
     }
 
     #[inline]
     pub(super) fn set(&mut self, slot: u32, aabb: Aabb) {
-        self.boxes[slot as usize] = aabb;
+        let known = std::mem::replace(&mut self.boxes[slot as usize], aabb);
+        let of = &self.slots[slot as usize];
+        if of.at == At::Resting && of.done & SET == 0 {
+            self.replaced.push((slot, known));
+        }
         self.note(slot, SET);
     }
 
@@ -158,6 +172,7 @@ impl Slots {
     /// Takes the slots to which something was done. [`take_done`](Self::take_done) of each, then
     /// [`give_back`](Self::give_back) follow.
     pub(super) fn take_changes(&mut self) -> Vec<u32> {
+<<<<<<< HEAD
         let mut changed = std::mem::take(&mut self.changed);
         if changed.len() > self.slots.len() / MANY_CHANGED {
             // Memory is read in order then, in whatever order the caller went.
@@ -166,6 +181,10 @@ impl Slots {
             changed.extend(slots.filter(|(_, of)| of.done != 0).map(|(slot, _)| slot));
         }
         changed
+=======
+        self.replaced.clear();
+        std::mem::take(&mut self.changed)
+>>>>>>> 955e321 (Serialise spaces, and what is in them, with serde)
     }
 
     /// Returns what was done to a body. That a body was removed stays known until [`free`](Self::free).
@@ -195,6 +214,22 @@ impl Slots {
             *of = Slot { generation: of.generation.checked_add(1).unwrap_or(1), at: At::Free, done: 0, ..*of };
             self.free.push(slot);
         }
+    }
+
+    /// Returns the slots without a body. The last one is used first.
+    #[cfg(feature = "serde")]
+    pub(super) fn free_slots(&self) -> &[u32] {
+        &self.free
+    }
+
+    #[cfg(feature = "serde")]
+    pub(super) fn set_free_slots(&mut self, free: Vec<u32>) {
+        self.free = free;
+    }
+
+    /// Exchanges the boxes of resting bodies with those at the last update, and back at the next call.
+    pub(super) fn exchange_replaced(&mut self) {
+        self.replaced.iter_mut().for_each(|(slot, aabb)| std::mem::swap(aabb, &mut self.boxes[*slot as usize]));
     }
 
     /// Returns the slots of resting bodies, ascending.

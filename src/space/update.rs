@@ -5,16 +5,22 @@ use crate::broad_phase::BroadPhase;
 use crate::changes::differences;
 use crate::error::Error;
 use crate::pairs::Alone;
-use crate::space::slots::{At, REMOVED, SET_BODY};
+use crate::space::slots::{At, REMOVED, SET_BODY, Slots};
 
 /// Makes the key of a pair of slots, the lower one in the upper half.
-fn key(a: u32, b: u32) -> u64 {
+pub(super) fn key(a: u32, b: u32) -> u64 {
     u64::from(a.min(b)) << 32 | u64::from(a.max(b))
 }
 
 /// Returns the slots of a key.
-fn slots(key: u64) -> (u32, u32) {
+pub(super) fn slots(key: u64) -> (u32, u32) {
     ((key >> 32) as u32, key as u32)
+}
+
+/// Returns the handles of a key.
+pub(super) fn handles(of: &Slots, key: u64) -> (Handle, Handle) {
+    let (a, b) = slots(key);
+    (of.handle(a), of.handle(b))
 }
 
 impl Space {
@@ -82,7 +88,7 @@ impl Space {
     /// Does what the caller has asked for since the previous update.
     fn apply(&mut self, changes: &[u32]) {
         // Newcomers take the places of active bodies that leave, so that few boxes change their position.
-        let (mut left, mut newcomers) = (Vec::new(), Vec::new());
+        let (mut left, mut woken, mut newcomers) = (Vec::new(), Vec::new(), Vec::new());
         for &slot in changes {
             let done = self.slots.take_done(slot);
             let removed = done & REMOVED != 0;
@@ -96,7 +102,7 @@ impl Space {
                     continue;
                 }
                 At::Active(at) => left.push(at),
-                At::Resting => self.leave_resting(slot),
+                At::Resting => woken.push(slot),
                 At::New | At::Free => {}
             }
             // The slot of a removed body stays taken until its pairs have ended.
@@ -107,6 +113,9 @@ impl Space {
                 newcomers.push((slot, if rests_at_once { self.update - IDLE } else { self.update }));
             }
         }
+        // Ascending, so that the order of the pairs that stay does not depend on the order of the changes.
+        woken.sort_unstable();
+        woken.into_iter().for_each(|slot| self.leave_resting(slot));
         left.sort_unstable();
         let mut places = left.iter().copied();
         newcomers.into_iter().for_each(|(slot, set_in)| self.activate(slot, set_in, places.next()));
@@ -115,7 +124,7 @@ impl Space {
     }
 
     /// Adds a body to the active ones, at this place if there is one.
-    fn activate(&mut self, slot: u32, set_in: u64, place: Option<u32>) {
+    pub(super) fn activate(&mut self, slot: u32, set_in: u64, place: Option<u32>) {
         let at = place.unwrap_or(self.active.len() as u32);
         self.slots.set_at(slot, At::Active(at));
         let (aabb, body) = (self.slots.boxes()[slot as usize], self.slots.body(slot));
@@ -182,10 +191,7 @@ impl Space {
         begun_keys.clear();
         ended_keys.clear();
         differences(keys, before, begun_keys, ended_keys)?;
-        let handles = |&key: &u64| -> (Handle, Handle) {
-            let (a, b) = self::slots(key);
-            (slots.handle(a), slots.handle(b))
-        };
+        let handles = |&key: &u64| handles(slots, key);
         begun.extend(begun_keys.iter().map(handles));
         ended.extend(ended_keys.iter().map(handles));
         pairs.extend(keys.iter().map(handles));
