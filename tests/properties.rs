@@ -1,9 +1,12 @@
 //! Properties that hold for any boxes.
 
+#[path = "common/space.rs"]
+mod space;
+
 use proptest::prelude::*;
 use sapwise::algorithm::{Displacement, Load};
 use sapwise::tuning::Step;
-use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, PairOrder, Pairs, Registry, Tuning};
+use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, PairOrder, Pairs, Registry, Space, Tuning};
 
 /// Bounds that meet often, with infinities, zeros of both signs and denormals among them.
 fn bound() -> impl Strategy<Value = f32> {
@@ -23,6 +26,14 @@ fn registry() -> (Registry, Vec<AlgorithmId>) {
     let registry = Registry::with_cores(2);
     let ids = registry.available().into_iter().map(|e| e.id).collect();
     (registry, ids)
+}
+
+/// Returns a space that must go on as the given one: a snapshot if there are snapshots.
+fn restored(space: &Space) -> Space {
+    #[cfg(feature = "serde")]
+    return serde_json::from_str(&serde_json::to_string(space).unwrap()).unwrap();
+    #[cfg(not(feature = "serde"))]
+    space.clone()
 }
 
 proptest! {
@@ -111,5 +122,17 @@ proptest! {
             brute.find_pairs(&boxes, &mut b).unwrap();
             prop_assert_eq!(a.fingerprint(), b.fingerprint());
         }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 1000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn space_is_a_list_with_a_double_loop(
+        bytes in prop::collection::vec(any::<u8>(), 0..1500),
+        algorithm in prop::sample::select(registry().1),
+    ) {
+        space::run(&bytes, [Space::new(), Space::with(Adaptive::only(algorithm, &registry().0).unwrap())], restored);
     }
 }

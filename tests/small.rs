@@ -1,10 +1,12 @@
-//! Every algorithm on a few dozen boxes of every kind that come, move and go: small enough for Miri and valgrind
-//! (`tools/sanitize.sh`).
+//! Every algorithm on a few dozen boxes of every kind that come, move and go, and calls on a space: small enough for
+//! Miri and valgrind (`tools/sanitize.sh`).
 
 mod common;
+#[path = "common/space.rs"]
+mod space;
 
 use common::{Random, WORLDS, denormals, every_algorithm, lattice, naive_filtered};
-use sapwise::{Aabb, BroadPhase, Filter, Membership, PairOrder, Pairs};
+use sapwise::{Aabb, BroadPhase, Filter, Membership, PairOrder, Pairs, Space};
 
 /// Boxes of a scene: more than any vector has lanes, and enough for a tree of several levels. Miri takes a second for
 /// such a frame.
@@ -68,5 +70,14 @@ fn odd_boxes() {
     assert_frames_agree("the same box", vec![Aabb::cube([3.0; 3], 1.0); 20], &mut algorithms);
     for count in (2..18).step_by(if cfg!(miri) { 7 } else { 1 }) {
         assert_frames_agree("a few boxes", random.cubes(count, [2.0; 3], 0.5), &mut algorithms);
+    }
+}
+
+#[test]
+fn calls_on_a_space() {
+    let mut random = Random(48);
+    for _ in 0..if cfg!(miri) { 2 } else { 20 } {
+        let bytes: Vec<u8> = (0..if cfg!(miri) { 400 } else { 1000 }).map(|_| (random.next() * 256.0) as u8).collect();
+        space::run(&bytes, [Space::new(), Space::new()], Clone::clone);
     }
 }

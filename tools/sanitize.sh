@@ -5,7 +5,7 @@
 #
 #   address   every test of the library on CPUs, under AddressSanitizer
 #   threads   pools, frames, changes and the few boxes under ThreadSanitizer, with a standard library that is built for it
-#   miri      every algorithm on one thread, on a few boxes, in Miri, at each level up to AVX2
+#   miri      every algorithm on one thread, on a few boxes, and a space, in Miri, at each level up to AVX2
 #   valgrind  the few boxes, threads that stay on their cores, and measured parameters, in valgrind
 #
 # All of them by default: about half an hour on two cores. Installs what is missing: rust-src, a nightly toolchain with Miri (rustup), valgrind

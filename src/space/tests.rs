@@ -1,216 +1,6 @@
 use super::*;
-use crate::algorithm::AlgorithmId;
 use crate::error::BoxDefect;
 use crate::ray::Ray;
-use crate::splitmix::mix;
-use std::collections::BTreeSet;
-
-type Set = BTreeSet<(Handle, Handle)>;
-
-/// Random numbers.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self, end: usize) -> usize {
-        self.0 += 1;
-        (mix(self.0) % end as u64) as usize
-    }
-
-    fn unit(&mut self) -> f32 {
-        self.next(1 << 20) as f32 / (1 << 20) as f32
-    }
-
-    /// Returns a box in a world of this size. Some are flat, some unbounded.
-    fn aabb(&mut self, world: f32) -> Aabb {
-        let centre = [0; 3].map(|_| self.unit() * world);
-        let mut b = Aabb::cube(centre, 0.3 + 0.4 * self.unit());
-        match self.next(400) {
-            0 => (b.min[1], b.max[0]) = (f32::NEG_INFINITY, f32::INFINITY),
-            1 => b.max[2] = b.min[2],
-            _ => {}
-        }
-        b
-    }
-
-    fn body(&mut self) -> Body {
-        match self.next(9) {
-            8 => Body::default().owner(1 + self.next(3) as u32),
-            0 => Body::fixed(),
-            1 => Body::kinematic(),
-            2 => Body::default().groups(1 << self.next(3)).masks(self.next(8) as u32),
-            _ => Body::default(),
-        }
-    }
-}
-
-/// Returns all pairs of a space by a double loop.
-fn double_loop(space: &Space) -> Set {
-    let all: Vec<_> = space.handles().map(|h| (h, space.get(h).unwrap())).collect();
-    let mut pairs = Set::new();
-    for (k, &(one, (a, body))) in all.iter().enumerate() {
-        for &(other, (b, another)) in &all[..k] {
-            if a.overlaps(b) && body.membership().wants(another.membership()) {
-                pairs.insert((other, one));
-            }
-        }
-    }
-    pairs
-}
-
-/// Updates, and compares all lists with what they should be.
-fn check(space: &mut Space, before: &mut Set, what: &str) {
-    let expected = double_loop(space);
-    space.update().unwrap();
-    let found: Set = space.pairs().iter().copied().collect();
-    assert_eq!(found.len(), space.pairs().len(), "{what}: a pair twice");
-    assert!(found == expected, "{what}: {} pairs, not {}", found.len(), expected.len());
-    let begun: Vec<_> = expected.difference(before).copied().collect();
-    let ended: Vec<_> = before.difference(&expected).copied().collect();
-    assert!(space.begun() == begun && space.ended() == ended, "{what}: begun or ended");
-    *before = expected;
-}
-
-/// Compares queries with what a loop over all bodies finds.
-fn check_queries(space: &Space, random: &mut Random, what: &str) {
-    let by = random.body();
-    let all: Vec<(Handle, Aabb, Body)> =
-        space.handles().map(|h| (h, space.get(h).unwrap())).map(|(h, (b, body))| (h, *b, *body)).collect();
-    for view in [None, Some(by)] {
-        let wanted = |body: &Body| view.is_none_or(|by| by.membership().wants(body.membership()));
-        let expected = |meets: &dyn Fn(&Aabb) -> bool| -> Vec<Handle> {
-            all.iter().filter(|(_, b, body)| meets(b) && wanted(body)).map(|&(handle, ..)| handle).collect()
-        };
-        let of = |space| View::of(space, view.as_ref());
-        let region = random.aabb(9.0);
-        let mut found = Vec::new();
-        of(space).query_box(&region, |handle| found.push(handle)).unwrap();
-        found.sort();
-        assert_eq!(found, expected(&|b| b.overlaps(&region)), "{what}: region");
-        let point = [0; 3].map(|_| random.unit() * 9.0);
-        found.clear();
-        of(space).query_point(point, |handle| found.push(handle)).unwrap();
-        found.sort();
-        assert_eq!(found, expected(&|b| b.overlaps(&Aabb::new(point, point))), "{what}: point");
-        // Along an axis the swept box is exact.
-        let length = random.unit() * 9.0;
-        let end = [point[0] + length, point[1], point[2]];
-        let ray = Ray { max: 1.0, ..Ray::new(point, [length, 0.0, 0.0]) };
-        found.clear();
-        of(space)
-            .cast_ray(&ray, |handle, _| {
-                found.push(handle);
-                f32::INFINITY
-            })
-            .unwrap();
-        found.sort();
-        let met = expected(&|b| b.overlaps(&Aabb::new(point, end)));
-        assert!(found.iter().zip(&met).filter(|(a, b)| a == b).count() + 1 >= met.len(), "{what}: ray");
-        let mut first = None;
-        for &handle in &found {
-            let low = (space.get(handle).unwrap().0.min[0] - point[0]) * (1.0 / length);
-            let t = low.max(0.0);
-            first = first.filter(|&(_, least)| least <= t).or(Some((handle, t)));
-        }
-        assert_eq!(of(space).first_hit(&ray).unwrap(), first, "{what}: first hit");
-        let distance = |b: &Aabb| {
-            let away = [0, 1, 2].map(|a| (b.min[a] - point[a]).max(point[a] - b.max[a]).max(0.0));
-            away.iter().map(|v| v * v).sum::<f32>().sqrt()
-        };
-        let mut near: Vec<(Handle, f32)> =
-            all.iter().filter(|(_, _, body)| wanted(body)).map(|(h, b, _)| (*h, distance(b))).collect();
-        near.sort_by(|(a, one), (b, other)| one.total_cmp(other).then(a.cmp(b)));
-        near.truncate(5);
-        let found = of(space).nearest(point, 5).unwrap();
-        assert_eq!(found.iter().map(|n| n.1).collect::<Vec<_>>(), near.iter().map(|n| n.1).collect::<Vec<_>>());
-    }
-}
-
-/// Inserts, sets and removes at random; at times most bodies rest, and at times all wake.
-fn random_calls(space: &mut Space, seed: u64, mut look: impl FnMut(&mut Space, usize)) -> [bool; 2] {
-    let mut random = Random(seed << 32);
-    let mut handles: Vec<Handle> = (0..300).map(|_| space.insert(random.aabb(9.0), random.body()).unwrap()).collect();
-    let mut rested = [false; 2];
-    for frame in 0..160 {
-        let moving = match frame / 40 {
-            0 | 2 => handles.len(),
-            1 => 8,
-            _ => 20,
-        };
-        for _ in 0..moving {
-            let handle = handles[if frame % 40 < 30 { random.next(moving) } else { random.next(handles.len()) }];
-            let mut b = *space.get(handle).unwrap().0;
-            let by = [0; 3].map(|_| random.unit() * 0.2 - 0.1);
-            (0..3).for_each(|a| (b.min[a], b.max[a]) = (b.min[a] + by[a], b.max[a] + by[a]));
-            space.set(handle, b).unwrap();
-        }
-        for _ in 0..random.next(4) {
-            match random.next(5) {
-                0 => {
-                    let at = random.next(handles.len());
-                    space.remove(handles.swap_remove(at)).unwrap();
-                }
-                1 => handles.push(space.insert(random.aabb(9.0), random.body()).unwrap()),
-                2 => {
-                    // Gone before any update has seen it.
-                    let gone = space.insert(random.aabb(9.0), random.body()).unwrap();
-                    space.remove(gone).unwrap();
-                }
-                3 => space.set_body(handles[random.next(handles.len())], random.body()).unwrap(),
-                _ => space.set(handles[random.next(handles.len())], random.aabb(9.0)).unwrap(),
-            }
-        }
-        look(space, frame);
-        rested[usize::from(space.resting.len() > 0)] = true;
-    }
-    rested
-}
-
-fn only(algorithm: &str) -> Space {
-    let id: AlgorithmId = algorithm.parse().unwrap();
-    Space::with(Adaptive::only(id, &Registry::new()).unwrap())
-}
-
-#[test]
-fn random_calls_give_the_pairs_of_a_double_loop() {
-    for seed in 0..6 {
-        let (mut space, mut before) = (Space::new(), Set::new());
-        let mut random = Random(1000 + seed);
-        let (mut twin, mut saved) = (Space::new(), Space::new());
-        let rested = random_calls(&mut space, seed, |space, frame| {
-            let what = format!("seed {seed}, frame {frame}");
-            if frame % 7 == 3 {
-                twin.clone_from(space);
-            }
-            check(space, &mut before, &what);
-            check_queries(space, &mut random, &what);
-            if frame % 7 == 3 {
-                twin.update().unwrap();
-                let lists = |space: &Space| [space.pairs(), space.begun(), space.ended()].map(<[_]>::to_vec);
-                assert!(lists(&twin) == lists(space), "{what}: clone");
-                check_queries(&twin, &mut random, &what);
-                saved.clone_from(space);
-                check_queries(&saved, &mut random, &what);
-            }
-        });
-        assert_eq!(rested, [true; 2]);
-    }
-}
-
-#[test]
-fn lists_depend_on_the_calls_alone() {
-    let lists = |mut space: Space| {
-        let mut lists = Vec::new();
-        random_calls(&mut space, 77, |space, _| {
-            space.update().unwrap();
-            lists.push([space.pairs().to_vec(), space.begun().to_vec(), space.ended().to_vec()]);
-        });
-        lists
-    };
-    let first = lists(Space::new());
-    for algorithm in ["brute@cpu1", "sap@cpu1", "pair-cache@cpu1"] {
-        assert!(lists(only(algorithm)) == first, "{algorithm}");
-    }
-}
 
 #[test]
 fn bodies_that_are_not_set_rest_and_wake() {
@@ -327,6 +117,36 @@ fn queries_leave_out_what_was_removed_since_and_report_bad_input() {
         .unwrap();
     assert_eq!(met, 1);
     assert_eq!(Space::new().nearest([0.0; 3], 3), Ok(vec![]));
+}
+
+#[test]
+fn clones_see_resting_bodies_at_the_last_update() {
+    let mut space = Space::new();
+    let row: Vec<Aabb> = (0..100).map(|k| Aabb::cube([k as f32, 0.0, 0.0], 0.4)).collect();
+    let handles = space.insert_all(&row, Body::fixed()).unwrap();
+    (0..2).for_each(|_| space.update().unwrap());
+    assert_eq!(space.resting.len(), 100);
+    for x in [200.0, 300.0] {
+        space.set(handles[7], Aabb::cube([x, 0.0, 0.0], 0.4)).unwrap();
+    }
+    for space in [space.clone(), space] {
+        assert_eq!(space.nearest([7.0, 0.0, 0.0], 1), Ok(vec![(handles[7], 0.0)]));
+        assert_eq!(space.nearest([300.0, 0.0, 0.0], 1).unwrap()[0].0, handles[99]);
+    }
+}
+
+/// The active bodies are not in the order of their handles.
+#[test]
+fn lowest_handle_is_the_nearest_of_equals() {
+    let mut space = Space::new();
+    let unit = Aabb::cube([0.0; 3], 1.0);
+    let handles = space.insert_all(&[unit; 9], Body::default()).unwrap();
+    space.update().unwrap();
+    space.remove(handles[0]).unwrap();
+    space.update().unwrap();
+    assert_eq!(space.nearest([5.0, 0.0, 0.0], 1), Ok(vec![(handles[1], 4.0)]));
+    let ray = Ray::new([5.0, 0.0, 0.0], [-1.0, 0.0, 0.0]);
+    assert_eq!(space.first_hit(&ray), Ok(Some((handles[1], 4.0))));
 }
 
 #[test]
