@@ -12,7 +12,7 @@ shift
 seconds=$(awk -v m="$minutes" 'BEGIN { if (m !~ /^[0-9]+([.][0-9]+)?$/) exit 1; printf "%d", m * 60 }') \
     || { echo "fuzz: $minutes is no number of minutes" >&2; exit 2; }
 targets=("$@")
-[ $# -gt 0 ] || targets=(frames files npy ids)
+[ $# -gt 0 ] || targets=(frames space files npy ids)
 
 cargo fuzz --version >/dev/null 2>&1 \
     || CARGO_TARGET_DIR=target/tools CARGO_PROFILE_DEV_DEBUG=false cargo install cargo-fuzz --version 0.13.2 --locked --debug --quiet
