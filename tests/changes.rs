@@ -146,6 +146,35 @@ fn changes_are_the_same_for_every_algorithm() {
     }
 }
 
+/// Boxes at rest, some of which are replaced in each frame: in the places of the removed ones, or behind all others.
+#[test]
+fn order_of_boxes_makes_no_difference() {
+    for (id, mut algorithm) in every_algorithm() {
+        let mut random = Random(0x0bde);
+        let mut boxes: Vec<(u64, Aabb)> = (0..).zip(random.cubes(500, [8.0; 3], 0.5)).collect();
+        let mut kept = boxes.clone();
+        let mut changes = [Changes::new(), Changes::new()];
+        let mut pairs = Pairs::new();
+        for frame in 0..20 {
+            for (boxes, changes) in [&boxes, &kept].into_iter().zip(&mut changes) {
+                let (ids, boxes): (Vec<u64>, Vec<Aabb>) = boxes.iter().copied().unzip();
+                algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+                changes.update(&pairs, &ids).unwrap();
+            }
+            let [one, other] = &changes;
+            assert!(one.pairs().len() > 50 && one.pairs() == other.pairs(), "{id}, frame {frame}");
+            assert!(one.begun() == other.begun() && one.ended() == other.ended(), "{id}, frame {frame}");
+            for (k, b) in random.cubes(10, [8.0; 3], 0.5).into_iter().enumerate() {
+                let at = (random.next() * 499.0) as usize;
+                let new = (1000 * (frame + 1) + k as u64, b);
+                kept.retain(|(id, _)| *id != boxes[at].0);
+                kept.push(new);
+                boxes[at] = new;
+            }
+        }
+    }
+}
+
 /// The output of a frame.
 #[derive(Debug, Default, PartialEq)]
 struct Output {

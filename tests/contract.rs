@@ -72,6 +72,16 @@ fn worlds_of_every_shape() {
 }
 
 #[test]
+fn sorted_intervals_on_one_axis() {
+    let mut random = Random(13);
+    let mut starts: Vec<f32> = (0..3000).map(|_| (random.next() * 456_000.0).floor()).collect();
+    starts.sort_unstable_by(f32::total_cmp);
+    let mut intervals = vec![Aabb::flat([0.0; 2], [456_000.0, 0.0])];
+    intervals.extend(starts.iter().map(|&s| Aabb::flat([s, 0.0], [s + 100.0 + (random.next() * 2900.0).floor(), 0.0])));
+    assert_all_agree("intervals", &intervals, &mut every_algorithm());
+}
+
+#[test]
 fn boxes_on_a_lattice_touch_exactly() {
     let mut algorithms = every_algorithm();
     assert_all_agree("a lattice", &lattice(), &mut algorithms);

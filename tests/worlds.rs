@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Random, naive_filtered};
+use common::{Random, every_algorithm, naive_filtered};
 use sapwise::algorithm::SimdLevel;
 use sapwise::internals::Pair;
 use sapwise::{Aabb, Error, Filter, Membership, PairOrder, Pairs, Registry, Worlds};
@@ -98,6 +98,28 @@ fn pairs_are_those_of_each_world() {
         assert_agree(&boxes, &starts, &memberships, &mut searches);
     }
     assert_agree(&[], &[], &[], &mut searches);
+}
+
+/// Worlds at the same place, each with a half-space that all its boxes may meet, as worlds and as groups.
+#[test]
+fn equal_worlds_have_the_same_pairs() {
+    let mut one = Random(1).cubes(30, [2.0; 3], 0.12);
+    one.iter_mut().for_each(|b| *b = Aabb::new(b.min.map(|v| v - 1.0), b.max.map(|v| v - 1.0)));
+    one.push(Aabb::new([-1.0e6; 3], [1.0e6, 1.0e6, 0.0]));
+    let boxes = one.repeat(32);
+    let starts: Vec<usize> = (0..=32).map(|k| 31 * k).collect();
+    let memberships: Vec<Membership> = (0..boxes.len())
+        .map(|k| Membership { groups: 1 << (k / 31), mask: 1 << (k / 31), ..Membership::ALL })
+        .collect();
+    assert_agree(&boxes, &starts, &[], &mut every_search());
+    let pairs = naive_filtered(&one, &[]).len();
+    assert!(pairs > 10);
+    for (id, mut algorithm) in every_algorithm() {
+        let mut found = Pairs::new();
+        found.set_filter(Some(Filter::new(memberships.clone())));
+        algorithm.find_pairs(&boxes, &mut found).unwrap();
+        assert!(found.len() == 32 * pairs && found.iter().all(|(i, j)| i / 31 == j / 31), "{id}");
+    }
 }
 
 #[test]
