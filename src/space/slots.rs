@@ -172,7 +172,7 @@ impl Slots {
     /// Takes the slots to which something was done. [`take_done`](Self::take_done) of each, then
     /// [`give_back`](Self::give_back) follow.
     pub(super) fn take_changes(&mut self) -> Vec<u32> {
-<<<<<<< HEAD
+        self.replaced.clear();
         let mut changed = std::mem::take(&mut self.changed);
         if changed.len() > self.slots.len() / MANY_CHANGED {
             // Memory is read in order then, in whatever order the caller went.
@@ -181,10 +181,6 @@ impl Slots {
             changed.extend(slots.filter(|(_, of)| of.done != 0).map(|(slot, _)| slot));
         }
         changed
-=======
-        self.replaced.clear();
-        std::mem::take(&mut self.changed)
->>>>>>> 955e321 (Serialise spaces, and what is in them, with serde)
     }
 
     /// Returns what was done to a body. That a body was removed stays known until [`free`](Self::free).
