@@ -8,7 +8,7 @@ use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::prelude::*;
 use sapwise::tuning::Step;
-use sapwise::{Aabb, Adaptive, AlgorithmId, Between, BroadPhase, Error, PairOrder, Pairs, Registry, Tuning};
+use sapwise::{Adaptive, AlgorithmId, Between, BroadPhase, Error, PairOrder, Pairs, Registry, Tuning};
 use sapwise_tune::StartOptions;
 use std::sync::{Arc, Mutex, PoisonError};
 
