@@ -4,6 +4,8 @@
 //! ```sh
 //! cargo bench -p sapwise-bench --bench gpu                            # all GPUs
 //! SAPWISE_GPUS=gpu1,gpu0+1 cargo bench -p sapwise-bench --bench gpu   # these, numbered as in `sapwise devices`
+//! cargo bench -p sapwise-bench --bench gpu -- --dispatches            # where a frame on one GPU spends its time
+//! cargo bench -p sapwise-bench --bench gpu -- --dispatches 1000,5000  # at these sizes
 //! ```
 //!
 //! Prints a table in Markdown, each size as soon as it is measured: wall clock, median and quartiles over the frames.
@@ -17,6 +19,9 @@
 //! Criterion can't interleave its candidates. Without `--bench`, which `cargo bench` passes, only the smallest size is
 //! run. Exit status 1 if a contestant failed or found other pairs.
 
+#[path = "gpu/dispatches.rs"]
+mod dispatches;
+
 use sapwise::algorithm::{Backend, usable_cores};
 use sapwise::{Aabb, AlgorithmId, BroadPhase, Pairs, Registry};
 use sapwise_gpu::{Gpu, Gpus, Resident, ResidentPairs, wgpu30 as wgpu};
@@ -27,6 +32,9 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 const SIZES: [usize; 5] = [1_000, 10_000, 100_000, 1_000_000, 10_000_000];
+
+/// Sizes of `--dispatches`.
+const SIZES_OF_DISPATCHES: &str = "100000,1000000,10000000";
 
 /// Frames of a size.
 const FRAMES: usize = 4;
@@ -258,6 +266,16 @@ fn bench() -> Result<Vec<String>, String> {
     }
     for gpu in gpus.identities() {
         println!("- gpu{}: {}, {}, {}", gpu.index, gpu.name, gpu.api, gpu.driver);
+    }
+    if let Some(at) = std::env::args().position(|argument| argument == "--dispatches") {
+        let sizes = std::env::args().nth(at + 1).filter(|sizes| !sizes.starts_with('-'));
+        let sizes = sizes.as_deref().unwrap_or(SIZES_OF_DISPATCHES).split(',').map(str::parse);
+        let sizes = sizes.collect::<Result<Vec<usize>, _>>().map_err(|e| format!("--dispatches: {e}"))?;
+        let first = on_gpus(&registry)?.first().and_then(|id| match id.backend() {
+            Backend::Gpu(indices) => indices.first().copied(),
+            _ => None,
+        });
+        return dispatches::print(&gpus, first.ok_or("there is no GPU")?, &sizes).map(|()| Vec::new());
     }
     let mut remarks = Vec::new();
     let mut cpu = vec![1, usable_cores()];

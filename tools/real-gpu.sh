@@ -3,10 +3,11 @@
 #
 #     tools/real-gpu.sh OUT_DIR
 #
-# Runs the algorithms on GPUs against the oracle, the benchmark of 1000 to 10 million objects with boxes in host and in
-# device memory, the full probe and sweep, predicted and measured tuning, and a scenario that runs on them. OUT_DIR gets
-# a log of each step, bench.md, report.json (for datasets/), tuning and a picture. A step that fails does not stop the
-# others, and the exit status is 1 then. What did not fit into the time is named at the end.
+# Runs the algorithms on GPUs against the oracle, times each dispatch, and runs the benchmark of 1000 to 10 million
+# objects with boxes in host and in device memory, the full probe and sweep, predicted and measured tuning, and a
+# scenario that runs on them. OUT_DIR gets a log of each step, bench.md, report.json (for datasets/), tuning and a
+# picture. A step that fails does not stop the others, and the exit status is 1 then. What did not fit into the time is
+# named at the end.
 #
 # Builds with cargo. For a machine without Rust or network, build elsewhere and carry one folder:
 #
@@ -26,6 +27,7 @@
 # LOADER_DEBS   folder of the Vulkan loader's .deb files, unpacked if the system has no loader [default: BIN_DIR]
 # LIMIT_FACTOR  multiplies every time limit; a software GPU on two cores needs 10 [default: 1]
 # SKIP          names of steps to leave out, as they are printed; every_size takes hours on a software GPU
+# ONLY          names of steps to run, and no others
 # SAPWISE_GPUS  the GPUs of the benchmark, such as gpu0,gpu0+1 [default: all]
 set -euo pipefail
 
@@ -131,9 +133,8 @@ step() {
     local name=$1 limit=$(($2 * factor)) left=$((total - reserve * factor - SECONDS)) status=0 began=$SECONDS
     shift 2
     printf '%-13s ' "$name"
-    case " ${SKIP:-} " in
-        *" $name "*) echo "left out"; return ;;
-    esac
+    case " ${ONLY:-$name} " in *" $name "*) ;; *) echo "left out"; return ;; esac
+    case " ${SKIP:-} " in *" $name "*) echo "left out"; return ;; esac
     [ "$limit" -le "$left" ] || limit=$((left > 0 ? left : 1))
     # After an interrupt, a probe keeps what it measured.
     timeout --signal=INT --kill-after=$((5 * factor)) "$limit" "$@" >"$out/$name.log" 2>&1 || status=$?
@@ -158,7 +159,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 if [ -n "${BIN_DIR:-}" ]; then
     bin=$(cd "$BIN_DIR" && pwd)
-elif [ -x "$here/sapwise" ]; then
+elif [ -x "$here/gpu_bench" ]; then
     bin=$here
 else
     bin=$work/bin
@@ -166,7 +167,7 @@ else
     build "$bin"
 fi
 for name in sapwise gpu_bench gpu_contract; do
-    [ -x "$bin/$name" ] || fail "there is no program $name in $bin"
+    [ -x "$bin/$name" ] || [ -n "${ONLY:-}" ] || fail "there is no program $name in $bin"
 done
 find_vulkan
 cd "$out"
@@ -192,6 +193,7 @@ for name in "${tests[@]}"; do
     [ ! -x "$bin/$name" ] || step "$name" 60 "$bin/$name"
 done
 step every_size 180 "$bin/gpu_contract" --ignored --nocapture
+step dispatches 60 "$bin/gpu_bench" --bench --dispatches
 step gpu_bench 120 "$bin/gpu_bench" --bench
 [ ! -e gpu_bench.log ] || sed -n '/^[-|]/p' gpu_bench.log >bench.md
 reserve=90

@@ -1,12 +1,13 @@
 //! An open GPU: device, queue, limits, and what went wrong with it.
 
 use super::scope::{Recording, Scope};
+use super::watch::{Place, Watch};
 use sapwise::error::{GpuError, GpuErrorKind};
 use sapwise::internals::GpuIdentity;
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Default time after which a GPU that does not answer counts as lost. Drivers of desktops give up after 2 to 10 s; a
@@ -27,6 +28,7 @@ struct Shared {
     /// Why it can no longer be used.
     fault: Fault,
     wait_limit_ms: AtomicU64,
+    watch: OnceLock<Watch>,
 }
 
 /// Set once: the first fault stays.
@@ -64,7 +66,8 @@ impl Gpu {
     pub fn from_parts(device: wgpu::Device, queue: wgpu::Queue, identity: GpuIdentity) -> Self {
         let limits = device.limits();
         let wait_limit_ms = AtomicU64::new(WAIT_LIMIT.as_millis() as u64);
-        Self { shared: Arc::new(Shared { identity, device, queue, limits, fault: Fault::default(), wait_limit_ms }) }
+        let (fault, watch) = (Fault::default(), OnceLock::new());
+        Self { shared: Arc::new(Shared { identity, device, queue, limits, fault, wait_limit_ms, watch }) }
     }
 
     /// Sets the handlers of a device that we opened ourselves, so that a loss is known before the next frame.
@@ -84,10 +87,25 @@ impl Gpu {
         Duration::from_millis(self.shared.wait_limit_ms.load(Ordering::Relaxed))
     }
 
+    /// Sets what sees every part of the frames on this GPU, for benchmarks. Only the first counts.
+    #[doc(hidden)]
+    pub fn watch(&self, watch: Watch) {
+        let _ = self.shared.watch.set(watch);
+    }
+
+    /// Tells the watch, if there is one, that a part of a frame ends here.
+    pub(super) fn ends(&self, part: &'static str, place: Place<'_, '_>) {
+        if let Some(watch) = self.shared.watch.get() {
+            watch(part, place);
+        }
+    }
+
     /// Begins to record commands. Errors of other calls, until the commands are submitted, count as theirs.
     #[doc(hidden)]
     pub fn record(&self) -> Recording {
-        Recording::new(&self.shared.device)
+        let mut recording = Recording::new(&self.shared.device);
+        self.ends("before", Place::Commands(&mut recording));
+        recording
     }
 
     /// Submits what was recorded.
@@ -95,9 +113,12 @@ impl Gpu {
     /// # Errors
     /// The device refuses it, or was lost.
     #[doc(hidden)]
-    pub fn submit(&self, recording: Recording) -> Result<wgpu::SubmissionIndex, GpuError> {
+    pub fn submit(&self, mut recording: Recording) -> Result<wgpu::SubmissionIndex, GpuError> {
         self.check()?;
-        recording.submit(&self.shared.queue).map_err(|e| self.refusal("the device refuses", e))
+        self.ends("copies after", Place::Commands(&mut recording));
+        let submission = recording.submit(&self.shared.queue).map_err(|e| self.refusal("the device refuses", e));
+        self.ends("submitting", Place::Host);
+        submission
     }
 
     /// Asks the device to map a part of a buffer. Only `done` gets the result.

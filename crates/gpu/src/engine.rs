@@ -22,6 +22,7 @@ use super::search::{Inputs, Search};
 use super::sorted::{Kind, MOST_OF_BOX, Sorted};
 use super::storage::{Storage, largest};
 use super::transfer::Transfer;
+use super::watch::Place;
 use bytemuck::{bytes_of, cast_slice};
 use sapwise::Aabb;
 use sapwise::error::{GpuError, GpuErrorKind};
@@ -266,11 +267,13 @@ impl Engine {
             (BOXES_AT, boxes, self.boxes.buffer()),
             (ids_at, ids, self.ids.buffer()),
         ];
+        self.gpu.ends("planning", Place::Host);
         let mut view = self.upload.writable(&self.gpu, ids_at + ids.len() as u64)?;
         for (at, bytes, _) in parts {
             view.slice(at as usize..at as usize + bytes.len()).copy_from_slice(bytes);
         }
         drop(view);
+        self.gpu.ends("copying into staging", Place::Host);
 
         let mut encoder = self.gpu.record();
         self.upload.unmap();
@@ -306,6 +309,7 @@ impl Engine {
             self.search.clear(encoder, params);
         }
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        self.gpu.ends("copies before, clears", Place::Pass(&mut pass));
         if first == Step::Sort {
             self.search.record_sort(&mut pass, params);
         }

@@ -1,6 +1,7 @@
 //! Kernels: compiled once, bound to buffers, dispatched.
 
 use super::device::Gpu;
+use super::watch::Place;
 use sapwise::error::GpuError;
 
 /// An entry point of a shader, compiled for one GPU.
@@ -16,8 +17,8 @@ pub struct Bound {
     pipeline: wgpu::ComputePipeline,
     /// `None` if the kernel uses no buffer.
     group: Option<wgpu::BindGroup>,
-    /// Most workgroups on an axis of a dispatch.
-    most: u32,
+    label: &'static str,
+    gpu: Gpu,
 }
 
 /// The shaders. Each is a concatenation of files, because WGSL has no includes.
@@ -130,15 +131,14 @@ impl Kernel {
             })
         };
         let group = if entries.is_empty() { None } else { Some(gpu.try_make(make)?) };
-        let most = gpu.limits().max_compute_workgroups_per_dimension;
-        Ok(Bound { pipeline: self.pipeline.clone(), group, most })
+        Ok(Bound { pipeline: self.pipeline.clone(), group, label: self.label, gpu: gpu.clone() })
     }
 }
 
 impl Bound {
     /// Adds a dispatch of `workgroups` or a few more, which the kernel ignores.
     pub fn dispatch(&self, pass: &mut wgpu::ComputePass<'_>, workgroups: u32) {
-        let wide = workgroups.min(self.most);
+        let wide = workgroups.min(self.gpu.limits().max_compute_workgroups_per_dimension);
         if wide > 0 {
             #[cfg(test)]
             DISPATCHED.set(DISPATCHED.get() + 1);
@@ -147,6 +147,7 @@ impl Bound {
                 pass.set_bind_group(0, group, &[]);
             }
             pass.dispatch_workgroups(wide, workgroups.div_ceil(wide), 1);
+            self.gpu.ends(self.label, Place::Pass(pass));
         }
     }
 }

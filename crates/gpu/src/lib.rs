@@ -69,6 +69,8 @@ mod source;
 mod storage;
 mod transfer;
 mod tree;
+#[doc(hidden)]
+pub mod watch;
 
 #[cfg(test)]
 pub(crate) use adapters::first_for_tests;

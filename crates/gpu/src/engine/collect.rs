@@ -5,6 +5,7 @@ use crate::failure::Failure;
 use crate::look::Look;
 use crate::output::PAIR;
 use crate::params::{Header, Params};
+use crate::watch::Place;
 use sapwise::Error;
 use sapwise::Pairs;
 use sapwise::error::GpuError;
@@ -90,6 +91,7 @@ impl Engine {
     /// Waits for a frame and returns its header.
     fn header_of(&self, frame: &Frame) -> Result<Header, Failure> {
         self.gpu.wait(frame.submission.clone())?;
+        self.gpu.ends("waiting", Place::Host);
         let header = self.downloaded(frame.params.submission)?;
         match header.invalid() {
             Some((index, defect)) => Err(Error::InvalidBox { index, defect }.into()),
@@ -202,6 +204,7 @@ impl Engine {
             let view = self.download.readable(&self.gpu, PAIRS_AT..PAIRS_AT + count * PAIR)?;
             let list: &[[u32; 2]] = bytemuck::cast_slice(&view);
             pairs.extend(list)?;
+            self.gpu.ends("reading out", Place::Host);
         }
         Ok(())
     }
