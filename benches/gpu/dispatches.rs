@@ -141,10 +141,20 @@ impl Clock {
 
     /// Returns the bytes per second that a copy in the GPU's memory reads and writes.
     fn bandwidth(&self) -> Result<f64, String> {
-        use wgpu::BufferUsages as U;
-        let size = self.plain.limits().max_buffer_size.min(COPIED);
-        let [from, to] = [(); 2].map(|()| buffer(&self.plain, size, U::COPY_SRC | U::COPY_DST));
-        Ok(2.0 * size as f64 / self.time(|encoder| encoder.copy_buffer_to_buffer(&from, 0, &to, 0, size))?)
+        let size = self.plain.limits().max_storage_buffer_binding_size.min(COPIED);
+        let text = "@group(0) @binding(0) var<storage, read> a: array<vec4u>;\n\
+            @group(0) @binding(1) var<storage, read_write> b: array<vec4u>;\n\
+            @compute @workgroup_size(256) fn copy(@builtin(workgroup_id) w: vec3u,\n\
+            @builtin(num_workgroups) n: vec3u, @builtin(local_invocation_index) t: u32) {\n\
+            let at = (w.y * n.x + w.x) * 256u + t; if (at < arrayLength(&b)) { b[at] = a[at]; } }";
+        let kernel = Kernel::compile(&self.plain, text.to_owned(), "copy", &[]).map_err(|e| e.to_string())?;
+        let [from, to] = [(); 2].map(|()| buffer(&self.plain, size, wgpu::BufferUsages::STORAGE));
+        let bound = kernel.bind(&self.plain, &[(0, &from), (1, &to)]).map_err(|e| e.to_string())?;
+        let seconds = self.time(|encoder| {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            bound.dispatch(&mut pass, (size / 4096) as u32);
+        })?;
+        Ok(2.0 * size as f64 / seconds)
     }
 
     /// Returns the seconds of a dispatch of one workgroup that depends on the one before.

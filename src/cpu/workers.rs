@@ -77,7 +77,7 @@ impl Workers {
     }
 
     /// Returns the calling thread alone.
-    pub(crate) fn one() -> Self {
+    pub fn one() -> Self {
         Self {
             threads: 1,
             tasks: 1,

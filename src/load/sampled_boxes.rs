@@ -11,6 +11,7 @@ pub(super) const MOST: usize = 256;
 const FEWEST: usize = 32;
 
 /// Up to 256 boxes of a frame, without invalid ones: the sample is taken before the input is checked.
+#[derive(Debug)]
 pub struct SampledBoxes {
     boxes: [Aabb; MOST],
     count: usize,

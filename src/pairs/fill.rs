@@ -1,6 +1,6 @@
 //! How the built-in algorithms write pairs: in blocks, through the filter, from the lists of their tasks.
 
-use super::Pairs;
+use super::{Pairs, Parallel};
 use crate::error::Error;
 use crate::pair::Pair;
 use std::sync::Arc;
@@ -9,6 +9,9 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 /// Pairs prefetched together, then tested together: few enough for the first-level cache, and enough to hide the
 /// latency of memory.
 const SIFTED_TOGETHER: usize = 64;
+
+/// Pairs that a thread copies at once: 64 KiB.
+const COPIED_TOGETHER: usize = 8192;
 
 /// Calls `f` for each set bit of a mask, ascending.
 #[inline(always)]
@@ -133,9 +136,16 @@ impl Pairs {
 
     /// Appends the wanted ones of pairs that stand lower member first.
     #[doc(hidden)]
-    pub fn extend(&mut self, pairs: &[[u32; 2]]) -> Result<(), Error> {
+    pub fn extend(&mut self, pairs: &[[u32; 2]], threads: &impl Parallel) -> Result<(), Error> {
         if self.filter.is_none() {
             self.reserve(self.len + pairs.len())?;
+            if let Some(room) = self.room(pairs.len()) {
+                threads.each_of(room.chunks_mut(COPIED_TOGETHER).zip(pairs.chunks(COPIED_TOGETHER)), |(to, pairs)| {
+                    to.iter_mut().zip(pairs).for_each(|(to, &[a, b])| *to = (a, b));
+                });
+                self.len += pairs.len();
+                return Ok(());
+            }
         }
         for pairs in pairs.chunks(SIFTED_TOGETHER) {
             if let Some(room) = self.room(pairs.len()) {

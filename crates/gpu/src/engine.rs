@@ -21,12 +21,12 @@ use super::scope::Recording;
 use super::search::{Inputs, Search};
 use super::sorted::{Kind, MOST_OF_BOX, Sorted};
 use super::storage::{Storage, largest};
-use super::transfer::Transfer;
+use super::transfer::{Transfer, copy};
 use super::watch::Place;
 use bytemuck::{bytes_of, cast_slice};
 use sapwise::Aabb;
 use sapwise::error::{GpuError, GpuErrorKind};
-use sapwise::internals::SampledBoxes;
+use sapwise::internals::{SampledBoxes, Workers};
 
 /// Bytes of a box.
 const BOX: u64 = size_of::<Aabb>() as u64;
@@ -245,18 +245,30 @@ impl Engine {
     ///
     /// `ids` has the number of each box in the frame, with the highest bit set if this piece owns the pairs of the
     /// box. `None`: `boxes` is the whole frame.
-    pub(super) fn start(&mut self, boxes: &[Aabb], ids: Option<&[u32]>, params: Params) -> Result<(), GpuError> {
+    pub(super) fn start(
+        &mut self,
+        boxes: &[Aabb],
+        ids: Option<&[u32]>,
+        params: Params,
+        workers: &Workers,
+    ) -> Result<(), GpuError> {
         self.prepare(&params, ids.is_some(), None)?;
-        self.submit(params, boxes, ids)
+        self.submit(params, boxes, ids, workers)
     }
 
     /// Submits a frame of boxes that are on the GPU, and does not wait.
     pub(super) fn start_resident(&mut self, boxes: &wgpu::Buffer, params: Params) -> Result<(), GpuError> {
         self.prepare(&params, false, Some(boxes))?;
-        self.submit(params, &[], None)
+        self.submit(params, &[], None, &Workers::one())
     }
 
-    fn submit(&mut self, mut params: Params, boxes: &[Aabb], ids: Option<&[u32]>) -> Result<(), GpuError> {
+    fn submit(
+        &mut self,
+        mut params: Params,
+        boxes: &[Aabb],
+        ids: Option<&[u32]>,
+        workers: &Workers,
+    ) -> Result<(), GpuError> {
         let blocks_left = self.number(&mut params);
         params.piece = u32::from(ids.is_some());
         let (boxes, ids): (&[u8], &[u8]) = (cast_slice(boxes), ids.map_or(&[], cast_slice));
@@ -270,7 +282,7 @@ impl Engine {
         self.gpu.ends("planning", Place::Host);
         let mut view = self.upload.writable(&self.gpu, ids_at + ids.len() as u64)?;
         for (at, bytes, _) in parts {
-            view.slice(at as usize..at as usize + bytes.len()).copy_from_slice(bytes);
+            copy(bytes, view.slice(at as usize..at as usize + bytes.len()), workers);
         }
         drop(view);
         self.gpu.ends("copying into staging", Place::Host);
@@ -308,9 +320,14 @@ impl Engine {
         if first == Step::Sort {
             self.search.clear(encoder, params);
         }
+        if first != Step::Write {
+            self.output.clear(encoder, params.blocks);
+        }
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
         self.gpu.ends("copies before, clears", Place::Pass(&mut pass));
         if first == Step::Sort {
+            // Overlaps with the first kernel of the sort.
+            self.sample(&mut pass);
             self.search.record_sort(&mut pass, params);
         }
         if first != Step::Write {
@@ -326,7 +343,7 @@ impl Engine {
         encoder.copy_buffer_to_buffer(self.header.buffer(), 0, download, 0, size_of::<Header>() as u64);
         let bytes = match &self.home {
             Home::Host => pairs * PAIR,
-            Home::Device(sampler) => sampler.record(&mut encoder, download, PAIRS_AT),
+            Home::Device(sampler) => sampler.copy(&mut encoder, download, PAIRS_AT),
         };
         if pairs > 0 {
             encoder.copy_buffer_to_buffer(self.output.pairs(), 0, download, PAIRS_AT, pairs * PAIR);
@@ -347,16 +364,24 @@ impl Engine {
     pub(super) fn look(&mut self, boxes: &wgpu::Buffer, objects: u32) -> Result<Look, GpuError> {
         let params = Params { objects, ..Params::default() };
         self.prepare(&params, false, Some(boxes))?;
-        let encoder = self.gpu.record();
+        let mut encoder = self.gpu.record();
         self.set(&params);
+        self.sample(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()));
         let submission = self.submit_and_download(encoder, 0)?;
         self.gpu.wait(submission)?;
-        self.seen()
+        Ok(Look::at(&self.sampled()?))
     }
 
-    /// Returns what the sampler of the last submission saw.
-    fn seen(&self) -> Result<Look, GpuError> {
+    /// Takes a sample of boxes that are on the GPU.
+    fn sample(&self, pass: &mut wgpu::ComputePass<'_>) {
+        if let Home::Device(sampler) = &self.home {
+            sampler.record(pass);
+        }
+    }
+
+    /// Returns the sample that came with the last submission.
+    fn sampled(&self) -> Result<SampledBoxes, GpuError> {
         let view = self.download.readable(&self.gpu, PAIRS_AT..PAIRS_AT + sampler::BYTES)?;
-        Ok(Look::at(&SampledBoxes::given(cast_slice(&view))))
+        Ok(SampledBoxes::given(cast_slice(&view)))
     }
 }

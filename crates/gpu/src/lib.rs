@@ -22,7 +22,8 @@
 //! A frame is *host-resident* or *device-resident*, and times of the two can't be compared:
 //!
 //! - Host-resident: boxes and pairs are in the memory of the CPU, and both transfers count. This is every
-//!   [`BroadPhase`](sapwise::BroadPhase), on GPUs as on CPUs, and every time without a label.
+//!   [`BroadPhase`](sapwise::BroadPhase), on GPUs as on CPUs, and every time without a label. Up to four threads copy
+//!   boxes and pairs, and the calling thread polls for a millisecond before it sleeps.
 //! - Device-resident: boxes are in one [`wgpu30::Buffer`] and pairs in another. This is [`Resident`].
 //!
 //! The order of the pairs is the same in every run, with two exceptions. Several GPUs share a frame by their measured

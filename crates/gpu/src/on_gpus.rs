@@ -5,7 +5,7 @@ use super::failure::{Failure, unavailable};
 use super::look::Look;
 use super::share::{Share, sizes, worst};
 use super::slabs::Slabs;
-use sapwise::algorithm::{Backend, FramePlan};
+use sapwise::algorithm::{Backend, FramePlan, usable_cores};
 use sapwise::error::{GpuError, ParseIdError};
 use sapwise::internals::{SceneStats, Threads, Workers, check_count};
 use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Pairs};
@@ -17,6 +17,9 @@ const MOST_OBJECTS: usize = 1 << 30;
 
 /// Most slabs that a GPU takes one after the other. If they overlap as much as that, more don't help.
 const MOST_ROUNDS: usize = 64;
+
+/// Most threads that copy boxes to a GPU and pairs from it. On an NVIDIA H200 more copy no faster.
+const MOST_COPIERS: u32 = 4;
 
 /// A method on one or several GPUs.
 #[derive(Debug)]
@@ -55,7 +58,8 @@ impl OnGpus {
         let parts = gpus.into_iter().map(|gpu| Share::new(gpu, id.method())).collect::<Result<Vec<_>, GpuError>>();
         let parts = parts.map_err(|e| unavailable(id, e))?;
         // Its own pool without pinning: the threads wait for drivers, whose own threads need a core.
-        let workers = Workers::new("gpu", parts.len() as u32, &Threads::default())?;
+        let threads = usable_cores().min(MOST_COPIERS).max(parts.len() as u32);
+        let workers = Workers::new("gpu", threads, &Threads::default())?;
         let (slabs, any_over) = (Slabs::default(), Arc::default());
         Ok(Box::new(Self { id: id.clone(), parts, slabs, workers, any_over, warm: false }))
     }
@@ -136,7 +140,7 @@ impl BroadPhase for OnGpus {
             return Err(Failure::limit(text).of(&self.id));
         }
         let found = match self.parts.as_mut_slice() {
-            [part] if boxes.len() <= part.engine.most_objects() => part.whole(plan, boxes, pairs),
+            [part] if boxes.len() <= part.engine.most_objects() => part.whole(plan, boxes, pairs, &self.workers),
             _ => {
                 let found = self.fitting_slabs(&plan.stats(boxes), boxes, pairs);
                 self.parts.iter_mut().for_each(|part| part.pairs.end_part());

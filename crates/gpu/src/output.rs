@@ -5,6 +5,9 @@ use super::kernel::{Bound, Kernel, source};
 use super::storage::{Storage, largest};
 use sapwise::error::GpuError;
 
+/// Counts that `positions` reads at once.
+const COUNTS: u64 = 4096;
+
 /// Bytes of a pair.
 pub(super) const PAIR: u64 = 8;
 
@@ -29,7 +32,7 @@ impl Output {
 
     /// Makes room for the counts of `blocks` blocks. Returns whether the buffer was replaced.
     pub(super) fn ensure_blocks(&mut self, gpu: &Gpu, blocks: u32) -> Result<bool, GpuError> {
-        self.sums.ensure(gpu, (u64::from(blocks) + 1) * 4)
+        self.sums.ensure(gpu, (u64::from(blocks) + 1).next_multiple_of(COUNTS) * 4)
     }
 
     /// Makes room for `pairs` pairs, or for as many as the GPU allows in one buffer. Returns whether the buffer was
@@ -73,6 +76,11 @@ impl Output {
     pub(super) fn bind(&mut self, gpu: &Gpu, params: &wgpu::Buffer, header: &wgpu::Buffer) -> Result<(), GpuError> {
         self.bound = Some(self.positions.bind(gpu, &[(0, params), (3, header), (4, self.sums.buffer())])?);
         Ok(())
+    }
+
+    /// Clears the counts of `blocks` blocks.
+    pub(super) fn clear(&self, encoder: &mut wgpu::CommandEncoder, blocks: u32) {
+        encoder.clear_buffer(self.sums.buffer(), 0, Some(u64::from(blocks) * 4));
     }
 
     /// Turns the counts into positions.

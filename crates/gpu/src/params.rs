@@ -28,7 +28,9 @@ pub(super) struct Params {
     pub(super) curve_shift: u32,
     pub(super) cell_blocks: u32,
     pub(super) usual: f32,
-    pub(super) unused: u32,
+    pub(super) passes: u32,
+    pub(super) curve_bits: u32,
+    pub(super) unused: [u32; 3],
     pub(super) curve: [[Segment; PARTS]; 3],
     pub(super) grid: [[Segment; PARTS]; 3],
 }
@@ -86,8 +88,14 @@ const FEWEST_OF_ROW: u32 = 1 << 10;
 const CURVE_CELLS: f64 = 1024.0;
 const CELLS_OF_BOX: f64 = 2.0;
 
-/// Bits of a place on the curve, including the two of the size.
-const CURVE_BITS: u32 = 32;
+/// Bits of a key for the size of the box, and those beyond the ones that would number the boxes: two more, because cells
+/// have unequal numbers of boxes.
+const SIZE_BITS: u32 = 2;
+const BITS_BEYOND: u32 = SIZE_BITS + 2;
+
+/// Bits of a digit of the radix sort, and passes that sort 32 bits.
+const DIGIT_BITS: u32 = 8;
+pub(super) const MOST_PASSES: u32 = 4;
 
 impl Params {
     /// Parameters of rows that are swept along an axis.
@@ -97,27 +105,31 @@ impl Params {
         // If most boxes are points, the usual extent is a small part of the world.
         let world = (0..3).map(|a| look.sample.range(a).1).fold(0.0, f64::max) / f64::from(objects.max(1)).cbrt();
         let usual = (1.0 / longest.max(world / 8.0)) as f32;
+        let curve =
+            turned.map(|a| look.parts[a].divide(|width, share| curve_cells(width, share, look.sample.extent[a])));
         Self {
             objects,
             axis: axis as u32,
             budget: (MOST_TESTS / objects.max(1)).clamp(FEWEST_OF_ROW, MOST_OF_ROW),
             top: 3 * raises(objects),
             usual: if usual.is_finite() { usual } else { 1.0 },
-            curve: turned.map(|a| {
-                look.parts[a].divide(|width, share| curve_cells(width, share, look.sample.extent[a])).segments
-            }),
+            curve_bits: 3 * curve.map(|axis| axis.cells.next_power_of_two().ilog2()).into_iter().max().unwrap_or(0),
+            curve: curve.map(|axis| axis.segments),
             ..Self::default()
         }
     }
 
     /// Sweeps along the axis on which the fewest pairs of the sample overlap.
     pub(super) fn sap(look: &Look, objects: u32) -> Self {
-        Self::rows(look, objects, look.sample.sweep_axis())
+        Self { passes: MOST_PASSES, ..Self::rows(look, objects, look.sample.sweep_axis()) }
     }
 
     /// Makes a tree over the boxes in the order of the curve.
     pub(super) fn bvh(look: &Look, objects: u32) -> Self {
-        Self::rows(look, objects, 0)
+        let rows = Self::rows(look, objects, 0);
+        let bits = rows.curve_bits + SIZE_BITS;
+        let passes = bits.min(objects.max(2).ilog2() + BITS_BEYOND).div_ceil(DIGIT_BITS);
+        Self { passes, curve_shift: bits.saturating_sub(passes * DIGIT_BITS), ..rows }
     }
 
     /// Divides space into strips with about as many slots as boxes. A bad choice costs speed, never a pair.
@@ -137,6 +149,7 @@ impl Params {
         let along = look.parts[a].divide(|_, share| share * wanted);
         let (slots, strips) = (along.cells, across_u.cells * across_v.cells);
         let large_key = strips * slots;
+        let rows = Self::rows(look, objects, a);
         // Oversized boxes are few: they get an eighth as many cells as there are boxes.
         let curve_bits = (objects.max(2).ilog2() - 1).saturating_sub(2).clamp(5, 16);
         let table = large_key + (1 << curve_bits) + 1;
@@ -146,9 +159,9 @@ impl Params {
             large_key,
             longest: (LARGE_LENGTHS * sample.extent[a]) as f32,
             grid: [along.segments, across_u.segments, across_v.segments],
-            curve_shift: CURVE_BITS - curve_bits,
+            curve_shift: (rows.curve_bits + SIZE_BITS).saturating_sub(curve_bits),
             cell_blocks: table.div_ceil(CELLS_OF_BLOCK),
-            ..Self::rows(look, objects, a)
+            ..rows
         }
     }
 }

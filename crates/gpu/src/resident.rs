@@ -7,6 +7,7 @@ use super::look::Look;
 use super::params::Params;
 use sapwise::algorithm::Backend;
 use sapwise::error::{BoxDefect, ParseIdError};
+use sapwise::internals::SampledBoxes;
 use sapwise::{Aabb, AlgorithmId, Error};
 
 /// Finds the pairs of boxes in the memory of a GPU and leaves them there, for engines whose data never leave it.
@@ -17,8 +18,10 @@ use sapwise::{Aabb, AlgorithmId, Error};
 pub struct Resident {
     id: AlgorithmId,
     engine: Engine,
-    /// What the last frame looked like, for which the next one is planned.
+    /// What an earlier frame looked like, for which the next one is planned.
     look: Option<Look>,
+    /// The sample of the last frame. It becomes the look while the GPU works on the next frame.
+    sample: Option<SampledBoxes>,
     /// The last submitted frame that has arrived.
     last: Option<SubmittedCounts>,
 }
@@ -30,7 +33,7 @@ pub struct ResidentPairs<'a> {
     /// `array<vec2<u32>>`: two positions in the input, the lower one first. What follows the first `count` pairs is
     /// undefined.
     pub buffer: &'a wgpu::Buffer,
-    /// Number of pairs. Each is there once; the order follows from this frame and the previous one.
+    /// Number of pairs. Each is there once; the order follows from this frame and the two before it.
     pub count: u32,
 }
 
@@ -81,7 +84,7 @@ impl Resident {
         let unknown = |e: ParseIdError| Error::UnknownAlgorithm { text: method.to_owned(), hint: e.to_string() };
         let id = AlgorithmId::new(method, Backend::Gpu(vec![gpu.identity().index])).map_err(unknown)?;
         let engine = Engine::resident(gpu.clone(), method).map_err(|error| unavailable(&id, error))?;
-        Ok(Self { id, engine, look: None, last: None })
+        Ok(Self { id, engine, look: None, sample: None, last: None })
     }
 
     /// Finds the pairs of the first `objects` boxes of a buffer of the same device, six 32-bit floats each: minimum,
@@ -132,7 +135,7 @@ impl Resident {
                 whole,
                 invalid: header.invalid(),
             });
-            self.look = Some(look);
+            (self.look, self.sample) = (Some(look), None);
         }
         if objects == 0 {
             return Ok(self.engine.submit_nothing()?);
@@ -141,7 +144,7 @@ impl Resident {
         Ok(self.engine.submit_ahead(boxes, params)?)
     }
 
-    /// Returns the parameters of a frame that looks like the previous one. The first waits for a sample.
+    /// Returns the parameters of a frame that looks like an earlier one. The first waits for a sample.
     fn plan(&mut self, boxes: &wgpu::Buffer, objects: u32) -> Result<Params, Failure> {
         let look = match self.look {
             Some(look) => look,
@@ -157,8 +160,11 @@ impl Resident {
         }
         let params = self.plan(boxes, objects)?;
         self.engine.start_resident(boxes, params)?;
-        let (count, look) = self.engine.finish_resident()?;
-        self.look = Some(look);
+        if let Some(sample) = self.sample.take() {
+            self.look = Some(Look::at(&sample));
+        }
+        let (count, sample) = self.engine.finish_resident()?;
+        self.sample = Some(sample);
         Ok(count)
     }
 

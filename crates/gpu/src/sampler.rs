@@ -29,14 +29,15 @@ impl Sampler {
         Ok(())
     }
 
-    /// Takes a sample, and copies it to `to` from byte `at` on. Returns its bytes.
-    pub(super) fn record(&self, encoder: &mut wgpu::CommandEncoder, to: &wgpu::Buffer, at: u64) -> u64 {
+    pub(super) fn record(&self, pass: &mut wgpu::ComputePass<'_>) {
         if let Some(bound) = &self.bound {
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            bound.dispatch(&mut pass, 1);
-            drop(pass);
-            encoder.copy_buffer_to_buffer(self.boxes.buffer(), 0, to, at, BYTES);
+            bound.dispatch(pass, 1);
         }
+    }
+
+    /// Copies the sample to `to` from byte `at` on. Returns its bytes.
+    pub(super) fn copy(&self, encoder: &mut wgpu::CommandEncoder, to: &wgpu::Buffer, at: u64) -> u64 {
+        encoder.copy_buffer_to_buffer(self.boxes.buffer(), 0, to, at, BYTES);
         BYTES
     }
 }

@@ -7,7 +7,7 @@ use super::look::Look;
 use super::slabs::{Members, Slabs};
 use sapwise::algorithm::FramePlan;
 use sapwise::error::GpuError;
-use sapwise::internals::SampledBoxes;
+use sapwise::internals::{SampledBoxes, Workers};
 use sapwise::{Aabb, Pairs};
 use std::time::Instant;
 
@@ -51,10 +51,16 @@ impl Share {
     }
 
     /// Finds the pairs of a whole frame.
-    pub(super) fn whole(&mut self, plan: &FramePlan, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Failure> {
+    pub(super) fn whole(
+        &mut self,
+        plan: &FramePlan,
+        boxes: &[Aabb],
+        pairs: &mut Pairs,
+        workers: &Workers,
+    ) -> Result<(), Failure> {
         let params = self.engine.plan(boxes.len() as u32, || Look::of(&SampledBoxes::from(boxes), plan.stats(boxes)));
-        self.engine.start(boxes, None, params)?;
-        self.engine.finish(pairs)
+        self.engine.start(boxes, None, params, workers)?;
+        self.engine.finish(pairs, workers)
     }
 
     /// Begins a frame of slabs.
@@ -76,7 +82,7 @@ impl Share {
         let Members { boxes, ids } = &self.members;
         self.work += (boxes.len() as f64).powf(self.engine.growth());
         let params = self.engine.plan(boxes.len() as u32, || Look::at(&SampledBoxes::from(boxes.as_slice())));
-        self.failure = self.engine.start(boxes, Some(ids), params).err().map(Failure::Gpu);
+        self.failure = self.engine.start(boxes, Some(ids), params, &Workers::one()).err().map(Failure::Gpu);
     }
 
     /// Waits for the slab. The first of `rounds` slabs counts for the speed only if there are no others.
@@ -84,7 +90,7 @@ impl Share {
         if self.full || self.failure.is_some() {
             return;
         }
-        self.failure = self.engine.finish(&mut self.pairs).err();
+        self.failure = self.engine.finish(&mut self.pairs, &Workers::one()).err();
         if let Some(began) = self.began.filter(|_| self.failure.is_none() && rounds == 1 && self.work > SMALLEST_WORK) {
             let speed = self.work / began.elapsed().as_nanos().max(1) as f64;
             self.speed = Some(self.speed.map_or(speed, |before| before + SPEED_FOLLOWS * (speed - before)));

@@ -2,15 +2,16 @@
 
 use super::device::Gpu;
 use super::kernel::{Bound, Kernel, source};
+use super::params::{MOST_PASSES, Params};
 use super::storage::{Storage, constant};
 use sapwise::error::GpuError;
 
-/// Passes of eight bits each, and values of a digit.
-const PASSES: u32 = 4;
+/// Values of a digit.
 const DIGITS: u32 = 256;
-/// Keys of one workgroup of `scatter`, and counts of one of `add_counts`.
+/// Keys of one workgroup of `scatter`.
 const BLOCK: u32 = 2048;
-const COUNTS: u32 = 4096;
+/// Workgroups of `add_counts`.
+const ADDERS: u32 = 32;
 
 /// The kernels and buffers of the sort.
 #[derive(Debug)]
@@ -23,14 +24,14 @@ pub(super) struct Sort {
     /// For each pass the counts of each digit and block.
     counts: Storage,
     starts: Storage,
-    /// The number of each pass, and whether it is the last.
+    /// The number of each pass.
     tasks: Vec<wgpu::Buffer>,
     passes: Vec<[Bound; 2]>,
 }
 
 impl Sort {
     pub(super) fn new(gpu: &Gpu) -> Result<Self, GpuError> {
-        let task = |pass| constant(gpu, "a sort pass", [pass, u32::from(pass + 1 == PASSES), 0, 0]);
+        let task = |pass| constant(gpu, "a sort pass", [pass, 0, 0, 0]);
         Ok(Self {
             add_counts: Kernel::new(gpu, source::SORT, "add_counts")?,
             scatter: Kernel::new(gpu, source::SORT, "scatter")?,
@@ -38,7 +39,7 @@ impl Sort {
             values: [Storage::new(gpu, "sorted positions")?, Storage::new(gpu, "sorted positions")?],
             counts: Storage::new(gpu, "digits of blocks")?,
             starts: Storage::new(gpu, "where digits begin")?,
-            tasks: (0..PASSES).map(task).collect::<Result<_, _>>()?,
+            tasks: (0..MOST_PASSES).map(task).collect::<Result<_, _>>()?,
             passes: Vec::new(),
         })
     }
@@ -49,8 +50,8 @@ impl Sort {
         for list in self.keys.iter_mut().chain(&mut self.values) {
             grown |= list.ensure(gpu, u64::from(objects) * 4)?;
         }
-        grown |= self.starts.ensure(gpu, u64::from(counts(objects)) * 4)?;
-        Ok(self.counts.ensure(gpu, bytes_of_counts(objects))? | grown)
+        grown |= self.starts.ensure(gpu, u64::from(counts(objects) + ADDERS) * 4)?;
+        Ok(self.counts.ensure(gpu, bytes_of_counts(objects, MOST_PASSES))? | grown)
     }
 
     pub(super) fn bind(&mut self, gpu: &Gpu, params: &wgpu::Buffer) -> Result<(), GpuError> {
@@ -76,21 +77,20 @@ impl Sort {
         [self.keys[0].buffer(), self.counts.buffer()]
     }
 
-    /// Returns the buffer that has the old position of each sorted key.
-    pub(super) fn order(&self) -> &wgpu::Buffer {
-        // The number of passes is even.
-        self.values[0].buffer()
+    /// Returns the buffers that have the old position of each sorted key after an even and an odd number of passes.
+    pub(super) fn orders(&self) -> [&wgpu::Buffer; 2] {
+        [self.values[0].buffer(), self.values[1].buffer()]
     }
 
     /// Clears the counts, before the keys are written.
-    pub(super) fn clear(&self, encoder: &mut wgpu::CommandEncoder, objects: u32) {
-        encoder.clear_buffer(self.counts.buffer(), 0, Some(bytes_of_counts(objects)));
+    pub(super) fn clear(&self, encoder: &mut wgpu::CommandEncoder, params: &Params) {
+        encoder.clear_buffer(self.counts.buffer(), 0, Some(bytes_of_counts(params.objects, params.passes)));
     }
 
-    pub(super) fn record(&self, pass: &mut wgpu::ComputePass<'_>, objects: u32) {
-        for [add_counts, scatter] in &self.passes {
-            add_counts.dispatch(pass, counts(objects).div_ceil(COUNTS));
-            scatter.dispatch(pass, objects.div_ceil(BLOCK));
+    pub(super) fn record(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
+        for [add_counts, scatter] in self.passes.iter().take(params.passes as usize) {
+            add_counts.dispatch(pass, ADDERS);
+            scatter.dispatch(pass, params.objects.div_ceil(BLOCK));
         }
     }
 }
@@ -100,6 +100,6 @@ fn counts(objects: u32) -> u32 {
     objects.div_ceil(BLOCK) * DIGITS
 }
 
-fn bytes_of_counts(objects: u32) -> u64 {
-    u64::from(counts(objects) * PASSES) * 4
+fn bytes_of_counts(objects: u32, passes: u32) -> u64 {
+    u64::from(counts(objects) * passes) * 4
 }

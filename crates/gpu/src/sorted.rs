@@ -22,7 +22,7 @@ pub(super) const MOST_OF_BOX: u64 = 40;
 /// Words of a row: its number of pairs, and its states before and after a submission.
 const ROW_WORDS: u64 = 3;
 /// Words for the pairs that a row keeps from counting to writing.
-const KEPT_WORDS: u64 = 4;
+const KEPT_WORDS: u64 = 8;
 
 /// The order of the boxes, and where the rows are searched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,7 +58,9 @@ pub(super) struct Sorted {
     boxes: Storage,
     rows: Storage,
     kept: Storage,
-    bound: Option<[Bound; 4]>,
+    bound: Option<[Bound; 3]>,
+    /// One for each buffer that may have the order.
+    gathers: Vec<Bound>,
 }
 
 /// What sorts the boxes.
@@ -93,6 +95,7 @@ impl Sorted {
             rows: Storage::new(gpu, "rows")?,
             kept: Storage::new(gpu, "kept pairs")?,
             bound: None,
+            gathers: Vec::new(),
         })
     }
 }
@@ -136,6 +139,7 @@ impl Search for Sorted {
         let sorted = self.boxes.buffer();
         let mut make_keys = vec![(0, params), (1, boxes), (2, ids), (3, header)];
         let mut gather = vec![(0, params), (1, boxes), (2, ids), (5, sorted)];
+        let orders;
         let mut rows = vec![
             (0, params),
             (2, sorted),
@@ -150,13 +154,14 @@ impl Search for Sorted {
                 sort.bind(gpu, params)?;
                 let [keys, counts] = sort.unsorted();
                 make_keys.extend([(4, keys), (5, counts)]);
-                gather.push((4, sort.order()));
+                orders = sort.orders().to_vec();
             }
             Order::Cells(cells) => {
                 cells.bind(gpu, params)?;
                 let [keys, counts, ranks] = cells.unsorted();
                 make_keys.extend([(4, keys), (5, counts), (6, ranks)]);
-                gather.extend([(4, cells.order()), (6, keys), (7, cells.table()), (8, cells.sorted_keys())]);
+                orders = vec![cells.order()];
+                gather.extend([(6, keys), (7, cells.table()), (8, cells.sorted_keys())]);
                 rows.extend([(1, cells.sorted_keys()), (8, cells.table())]);
                 table = Some(cells.table());
             }
@@ -166,31 +171,29 @@ impl Search for Sorted {
         }
         let write = self.write.bind(gpu, &rows)?;
         rows.push((3, header));
-        self.bound = Some([
-            self.make_keys.bind(gpu, &make_keys)?,
-            self.gather.bind(gpu, &gather)?,
-            self.count.bind(gpu, &rows)?,
-            write,
-        ]);
+        let gather_from = |order| self.gather.bind(gpu, &[gather.as_slice(), &[(4, order)]].concat());
+        self.gathers = orders.into_iter().map(gather_from).collect::<Result<_, _>>()?;
+        self.bound = Some([self.make_keys.bind(gpu, &make_keys)?, self.count.bind(gpu, &rows)?, write]);
         Ok(())
     }
 
     fn clear(&self, encoder: &mut wgpu::CommandEncoder, params: &Params) {
         match &self.order {
-            Order::Radix(sort) => sort.clear(encoder, params.objects),
+            Order::Radix(sort) => sort.clear(encoder, params),
             Order::Cells(cells) => cells.clear(encoder, params),
         }
     }
 
     fn record_sort(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
-        let Some([make_keys, gather, ..]) = &self.bound else { return };
+        let Some([make_keys, ..]) = &self.bound else { return };
         let groups = params.objects.div_ceil(BOXES);
         make_keys.dispatch(pass, groups);
         match &self.order {
-            Order::Radix(sort) => sort.record(pass, params.objects),
+            Order::Radix(sort) => sort.record(pass, params),
             Order::Cells(cells) => cells.record(pass, params),
         }
-        gather.dispatch(pass, groups);
+        // Each pass of the radix sort reads one buffer and writes the other.
+        self.gathers[params.passes as usize % self.gathers.len()].dispatch(pass, groups);
         if let Some(tree) = &self.tree {
             tree.record(pass, params.objects);
         }

@@ -3,9 +3,10 @@
 use super::device::Gpu;
 use super::storage::Storage;
 use sapwise::error::GpuError;
+use sapwise::internals::Workers;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// A buffer that the CPU writes or reads while it is mapped, and the GPU copies while it is not.
 #[derive(Debug)]
@@ -21,6 +22,22 @@ const ASKED: u8 = 1;
 const MAPPED: u8 = 2;
 
 const NOT_MAPPED: &str = "the driver refuses to map memory";
+
+/// Bytes that a worker copies at once.
+const COPIED: usize = 64 << 10;
+
+/// Copies to mapped memory, with several threads if there is much: on an NVIDIA H200 one thread writes 15 GB/s over the
+/// bus, and four write 32.
+pub(super) fn copy(bytes: &[u8], to: wgpu::WriteOnly<'_, [u8]>, workers: &Workers) {
+    let (chunks, mut rest) = to.into_chunks::<COPIED>();
+    // Only chunks of a fixed size may change threads.
+    let chunks: Vec<_> = chunks.into_iter().collect();
+    let (all, last) = bytes.split_at(chunks.len() * COPIED);
+    workers.each_of(chunks.into_iter().zip(all.chunks(COPIED)), |(to, from)| {
+        wgpu::WriteOnly::<[u8]>::from(to).copy_from_slice(from);
+    });
+    rest.copy_from_slice(last);
+}
 
 impl Transfer {
     /// Memory that the CPU writes.
@@ -84,17 +101,21 @@ impl Transfer {
     /// Checks that the mapping is done, after a wait for the GPU. If several threads wait for one GPU, another one
     /// may have taken this mapping's callback and be about to run it.
     fn mapped(&self, gpu: &Gpu) -> Result<(), GpuError> {
-        let start = Instant::now();
-        while self.state.load(Ordering::Acquire) == ASKED && start.elapsed() < gpu.wait_limit() {
-            gpu.poll(wgpu::PollType::Poll).map_err(|e| gpu.refusal(NOT_MAPPED, e))?;
-            gpu.check()?;
-            std::thread::yield_now();
-        }
-        let mapped = self.state.load(Ordering::Acquire) == MAPPED;
+        let mapped = self.arrives_within(gpu, gpu.wait_limit())?;
         if mapped { Ok(()) } else { Err(gpu.refusal(NOT_MAPPED, wgpu::BufferAsyncError)) }
     }
 
-    /// Polls the device, and returns whether the memory is mapped. Does not wait.
+    /// Polls the device until the memory is mapped or time runs out, and returns whether it is mapped.
+    pub(super) fn arrives_within(&self, gpu: &Gpu, limit: Duration) -> Result<bool, GpuError> {
+        let start = Instant::now();
+        while self.is_on_its_way() && start.elapsed() < limit {
+            self.arrived(gpu)?;
+            std::thread::yield_now();
+        }
+        Ok(self.state.load(Ordering::Acquire) == MAPPED)
+    }
+
+    /// Polls the device once, and returns whether the memory is mapped.
     pub(super) fn arrived(&self, gpu: &Gpu) -> Result<bool, GpuError> {
         gpu.poll(wgpu::PollType::Poll).map_err(|e| gpu.refusal(NOT_MAPPED, e))?;
         gpu.check()?;

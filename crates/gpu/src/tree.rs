@@ -41,9 +41,9 @@ impl Tree {
         Ok(Self { kernel: Kernel::new(gpu, source::TREE, entry)?, tasks, bound: Vec::new() })
     }
 
-    /// Returns the boxes and nodes of a tree over `objects` boxes.
+    /// Returns the boxes and nodes of a tree over `objects` boxes, and the seven that a walk may read behind them.
     pub(super) fn elements(objects: u32) -> u64 {
-        (0..=3 * raises(objects)).map(|level| u64::from(nodes(objects, level))).sum()
+        (0..=3 * raises(objects)).map(|level| u64::from(nodes(objects, level))).sum::<u64>() + 7
     }
 
     pub(super) fn bind(
@@ -75,9 +75,9 @@ mod tests {
 
     #[test]
     fn a_tree_has_room_for_its_levels_and_few_roots() {
-        assert_eq!(Tree::elements(1), 4);
-        assert_eq!(Tree::elements(512), 512 + 64 + 8 + 1);
-        assert_eq!(Tree::elements(513), 513 + 65 + 9 + 2);
+        assert_eq!(Tree::elements(1), 4 + 7);
+        assert_eq!(Tree::elements(512), 512 + 64 + 8 + 1 + 7);
+        assert_eq!(Tree::elements(513), 513 + 65 + 9 + 2 + 7);
         assert_eq!((raises(32_768), raises(32_769)), (1, 2));
         assert_eq!(raises(1 << 26), MOST_RAISES);
     }

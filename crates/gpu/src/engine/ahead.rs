@@ -46,7 +46,7 @@ impl Engine {
         self.pending = Pending::Nothing;
         let header = self.downloaded(submission)?;
         self.expected = header.total();
-        Ok(Some((header, self.seen()?)))
+        Ok(Some((header, Look::at(&self.sampled()?))))
     }
 
     /// Returns the buffer of the [`Header`], which the program's kernels may read.

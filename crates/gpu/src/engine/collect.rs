@@ -2,18 +2,23 @@
 
 use super::{Engine, Frame, PAIRS_AT, Pending, Step};
 use crate::failure::Failure;
-use crate::look::Look;
 use crate::output::PAIR;
 use crate::params::{Header, Params};
 use crate::watch::Place;
 use sapwise::Error;
 use sapwise::Pairs;
 use sapwise::error::GpuError;
+use sapwise::internals::{SampledBoxes, Workers};
 use std::mem::{offset_of, take};
+use std::time::Duration;
+
+/// Time for which a wait polls before it sleeps. A thread that slept is woken some 50 µs late, and submits the next
+/// frame more slowly.
+const POLLED: Duration = Duration::from_millis(1);
 
 impl Engine {
     /// Waits for the frame, and adds its pairs to the list.
-    pub(crate) fn finish(&mut self, pairs: &mut Pairs) -> Result<(), Failure> {
+    pub(crate) fn finish(&mut self, pairs: &mut Pairs, workers: &Workers) -> Result<(), Failure> {
         let mut all = 0;
         while let Pending::Frame(mut frame) = take(&mut self.pending) {
             let header = self.header_of(&frame)?;
@@ -23,7 +28,7 @@ impl Engine {
                 // More than the caller wants: they stay on the GPU.
                 pairs.exceed();
             } else {
-                self.fetch(&mut frame, total, pairs)?;
+                self.fetch(&mut frame, total, pairs, workers)?;
             }
             if pairs.is_over() {
                 break;
@@ -35,14 +40,14 @@ impl Engine {
     }
 
     /// Waits for the frame. Returns the number of pairs, all of which are in [`pairs_buffer`](Self::pairs_buffer),
-    /// and what the boxes look like.
-    pub(crate) fn finish_resident(&mut self) -> Result<(u32, Look), Failure> {
+    /// and a sample of the boxes.
+    pub(crate) fn finish_resident(&mut self) -> Result<(u32, SampledBoxes), Failure> {
         let mut all = 0_u64;
-        let mut look = None;
+        let mut sample = None;
         while let Pending::Frame(mut frame) = take(&mut self.pending) {
             let header = self.header_of(&frame)?;
-            // Every submission of a frame takes the same sample.
-            look = Some(look.map_or_else(|| self.seen(), Ok)?);
+            // Every submission of a frame has the same sample.
+            sample = Some(sample.map_or_else(|| self.sampled(), Ok)?);
             let before = all;
             all += header.total();
             if all > u64::from(u32::MAX) {
@@ -56,7 +61,7 @@ impl Engine {
             self.go_on(frame, &header, (all as u32).wrapping_neg())?;
         }
         self.expected = all;
-        Ok((all as u32, look.unwrap_or_default()))
+        Ok((all as u32, sample.unwrap_or_else(|| SampledBoxes::given(&[]))))
     }
 
     /// Replaces the list of pairs by a larger one with the same first `kept` pairs.
@@ -90,7 +95,9 @@ impl Engine {
 
     /// Waits for a frame and returns its header.
     fn header_of(&self, frame: &Frame) -> Result<Header, Failure> {
-        self.gpu.wait(frame.submission.clone())?;
+        if !self.download.arrives_within(&self.gpu, POLLED)? {
+            self.gpu.wait(frame.submission.clone())?;
+        }
         self.gpu.ends("waiting", Place::Host);
         let header = self.downloaded(frame.params.submission)?;
         match header.invalid() {
@@ -111,9 +118,9 @@ impl Engine {
     }
 
     /// Adds `total` pairs to the list: those that came with the header, then the others in as many steps as needed.
-    fn fetch(&mut self, frame: &mut Frame, total: u64, pairs: &mut Pairs) -> Result<(), Failure> {
+    fn fetch(&mut self, frame: &mut Frame, total: u64, pairs: &mut Pairs, workers: &Workers) -> Result<(), Failure> {
         let mut have = total.min(frame.sent).min(u64::from(frame.params.capacity));
-        self.append(have, pairs)?;
+        self.append(have, pairs, workers)?;
         if have == total {
             return Ok(());
         }
@@ -140,7 +147,7 @@ impl Engine {
             encoder.copy_buffer_to_buffer(self.output.pairs(), from, self.download.buffer(), PAIRS_AT, count * PAIR);
             let submission = self.submit_mapped(encoder, PAIRS_AT + count * PAIR)?;
             self.gpu.wait(submission)?;
-            self.append(count, pairs)?;
+            self.append(count, pairs, workers)?;
             have += count;
         }
         Ok(())
@@ -199,11 +206,11 @@ impl Engine {
     }
 
     /// Adds the first `count` pairs of the download to the list.
-    fn append(&self, count: u64, pairs: &mut Pairs) -> Result<(), Failure> {
+    fn append(&self, count: u64, pairs: &mut Pairs, workers: &Workers) -> Result<(), Failure> {
         if count > 0 {
             let view = self.download.readable(&self.gpu, PAIRS_AT..PAIRS_AT + count * PAIR)?;
             let list: &[[u32; 2]] = bytemuck::cast_slice(&view);
-            pairs.extend(list)?;
+            pairs.extend(list, workers)?;
             self.gpu.ends("reading out", Place::Host);
         }
         Ok(())

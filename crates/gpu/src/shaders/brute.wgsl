@@ -76,9 +76,9 @@ fn count(@builtin(workgroup_id) w: vec3u, @builtin(num_workgroups) n: vec3u, @bu
     if (tile.x == tile.y && tile.x * TILE + t < params.objects) {
         check_box(tile.x * TILE + t);
     }
-    _ = exclusive(t, ones(hits(tile, t, true)));
-    if (t == TILE - 1u) {
-        sums[block] = scan[t];
+    let found = sum(t, ones(hits(tile, t, true)));
+    if (t == 0u) {
+        sums[block] = found;
     }
 }
 

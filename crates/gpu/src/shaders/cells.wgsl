@@ -34,9 +34,9 @@ fn add_up(@builtin(workgroup_id) w: vec3u, @builtin(num_workgroups) n: vec3u, @b
     }
     let at = block * (EACH / 4u) + t;
     let own = cells[at] + cells[at + THREADS] + cells[at + 2u * THREADS] + cells[at + 3u * THREADS];
-    _ = exclusive(t, total(own));
-    if (t == THREADS - 1u) {
-        sums[block] = scan[t];
+    let all_own = sum(t, total(own));
+    if (t == 0u) {
+        sums[block] = all_own;
     }
 }
 
@@ -55,10 +55,7 @@ fn begin(@builtin(workgroup_id) w: vec3u, @builtin(num_workgroups) n: vec3u, @bu
     let b = cells[at + 1u];
     let c = cells[at + 2u];
     let d = cells[at + 3u];
-    _ = exclusive(t, before);
-    let blocks_before = scan[THREADS - 1u];
-    workgroupBarrier();
-    let first = blocks_before + exclusive(t, total(a + b + c + d));
+    let first = sum(t, before) + exclusive(t, total(a + b + c + d));
     cells[at] = starts(first, a);
     cells[at + 1u] = starts(first + total(a), b);
     cells[at + 2u] = starts(first + total(a + b), c);

@@ -45,13 +45,19 @@ struct Params {
     budget: u32,
     // Highest level of the tree; see `levels.wgsl`.
     top: u32,
-    // Lower bits of a place on the curve that the cell of an oversized box drops.
+    // Lower bits of a place on the curve that a key, or the cell of an oversized box, drops.
     curve_shift: u32,
     // Blocks of cells; see `cells.wgsl`.
     cell_blocks: u32,
     // One over the longest extent of a usual box.
     usual: f32,
-    unused: u32,
+    // Passes of the radix sort.
+    passes: u32,
+    // Bits of the grid of the curve, above which are those of the size.
+    curve_bits: u32,
+    unused_a: u32,
+    unused_b: u32,
+    unused_c: u32,
     // The parts of the three axes, the sweep axis first: into the cells of the curve, then into slots and cells of
     // the grid. See `division.wgsl`.
     segments: array<Segment, 96>,

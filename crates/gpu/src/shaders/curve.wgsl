@@ -44,7 +44,8 @@ fn hilbert(place: vec3u) -> u32 {
     return (spread(p.x) << 2u) | (spread(p.y) << 1u) | spread(p.z);
 }
 
-// Returns two bits of size, then thirty of the place of the centre.
+// Returns two bits of size, then those of the place of the centre. If the grid has less than 1024 cells on an axis, the
+// upper bits of the place are zero.
 fn curve(at: u32) -> u32 {
     let low = vec3f(tame(bound(at, 0u, 0u)), tame(bound(at, 0u, 1u)), tame(bound(at, 0u, 2u)));
     let high = vec3f(tame(bound(at, 1u, 0u)), tame(bound(at, 1u, 1u)), tame(bound(at, 1u, 2u)));
@@ -52,5 +53,5 @@ fn curve(at: u32) -> u32 {
     let longest = max(max(extent.x, extent.y), extent.z) * params.usual;
     let size = u32(longest > 8.0) + u32(longest > 64.0) + u32(longest > 512.0);
     let middle = low + extent * 0.5;
-    return (size << 30u) | hilbert(vec3u(cell(middle.x, 0u), cell(middle.y, PARTS), cell(middle.z, 2u * PARTS)));
+    return (size << params.curve_bits) | hilbert(vec3u(cell(middle.x, 0u), cell(middle.y, PARTS), cell(middle.z, 2u * PARTS)));
 }

@@ -37,7 +37,7 @@ fn curve_keys(
 ) {
     let at = invocation(w, n, t);
     if (at < params.objects) {
-        put_key(at, curve(at));
+        put_key(at, curve(at) >> params.curve_shift);
     }
 }
 

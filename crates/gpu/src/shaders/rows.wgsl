@@ -7,7 +7,7 @@
 
 const THREADS: u32 = 64u;
 // Pairs that a row keeps while it counts, so that most rows are searched once.
-const KEPT: u32 = 4u;
+const KEPT: u32 = 8u;
 // The state of a row without further candidates.
 const DONE: u32 = 0xffffffffu;
 
@@ -15,11 +15,13 @@ const DONE: u32 = 0xffffffffu;
 @group(0) @binding(1) var<storage, read> keys: array<u32>;
 @group(0) @binding(2) var<storage, read> boxes: array<Box>;
 @group(0) @binding(3) var<storage, read_write> header: Header;
-@group(0) @binding(4) var<storage, read_write> sums: array<u32>;
+// The number of pairs of each block, cleared before `count`; then the position of its first pair.
+@group(0) @binding(4) var<storage, read_write> sums: array<atomic<u32>>;
 @group(0) @binding(5) var<storage, read_write> pairs: array<vec2u>;
 // The number of pairs of each row in this submission; then the states of all rows before even submissions, then
 // before odd ones.
 @group(0) @binding(6) var<storage, read_write> rows: array<u32>;
+// The partner in the first pair of each row, then in the second, and so on.
 @group(0) @binding(7) var<storage, read_write> kept: array<u32>;
 
 var<private> writing: bool;
@@ -61,7 +63,7 @@ fn hit(row: u32, a: u32, b: u32) {
     if (writing) {
         store(start + found, pair_of(a, b));
     } else if (found < KEPT) {
-        kept[row * KEPT + found] = b;
+        kept[found * params.objects + row] = b;
     }
     found++;
 }
@@ -69,46 +71,43 @@ fn hit(row: u32, a: u32, b: u32) {
 @compute @workgroup_size(64)
 fn count(@builtin(workgroup_id) w: vec3u, @builtin(num_workgroups) n: vec3u, @builtin(local_invocation_index) t: u32) {
     let block = w.y * n.x + w.x;
-    if (block >= params.blocks) {
+    let row = block * THREADS + t;
+    if (block >= params.blocks || row >= params.objects) {
         return;
     }
-    let row = block * THREADS + t;
-    if (row < params.objects) {
-        let state = test_row(row);
-        rows[row] = found;
-        rows[state_at(row, params.round + 1u)] = state;
-        if (state != DONE) {
-            atomicStore(&header.more, 1u);
-        }
+    let state = test_row(row);
+    rows[row] = found;
+    rows[state_at(row, params.round + 1u)] = state;
+    if (state != DONE) {
+        atomicStore(&header.more, 1u);
     }
-    _ = exclusive(t, found);
-    if (t == THREADS - 1u) {
-        sums[block] = scan[t];
+    if (found > 0u) {
+        atomicAdd(&sums[block], found);
     }
 }
 
 @compute @workgroup_size(64)
 fn write(@builtin(workgroup_id) w: vec3u, @builtin(num_workgroups) n: vec3u, @builtin(local_invocation_index) t: u32) {
     let block = w.y * n.x + w.x;
-    if (block >= params.blocks) {
+    let row = block * THREADS + t;
+    if (block >= params.blocks || row >= params.objects) {
         return;
     }
-    let row = block * THREADS + t;
-    var count = 0u;
-    if (row < params.objects) {
-        count = rows[row];
+    let count = rows[row];
+    if (count == 0u) {
+        return;
     }
-    start = sums[block] + exclusive(t, count) - params.window;
+    start = atomicLoad(&sums[block]) - params.window;
+    for (var k = block * THREADS; k < row; k++) {
+        start += rows[k];
+    }
     if (count > KEPT) {
         writing = true;
         _ = test_row(row);
         return;
     }
-    if (count == 0u) {
-        return;
-    }
     let a = boxes[row].lo.w;
     for (var k = 0u; k < count; k++) {
-        store(start + k, pair_of(a, kept[row * KEPT + k]));
+        store(start + k, pair_of(a, kept[k * params.objects + row]));
     }
 }

@@ -8,15 +8,14 @@ const THREADS: u32 = 256u;
 // Invocations of a group, which has a bit for each in a word, and groups of a workgroup.
 const LANES: u32 = 32u;
 const GROUPS: u32 = 8u;
-// Counts for each invocation of `add_counts`.
-const EACH: u32 = 16u;
+// Digits of a workgroup of `add_counts`.
+const TOGETHER: u32 = 8u;
 
 struct Pass {
     number: u32,
-    // 1 in the last pass, after which no digit is left to count.
-    last: u32,
     unused_a: u32,
     unused_b: u32,
+    unused_c: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -26,44 +25,34 @@ struct Pass {
 @group(0) @binding(4) var<storage, read_write> keys_out: array<u32>;
 @group(0) @binding(5) var<storage, read_write> values_out: array<u32>;
 @group(0) @binding(6) var<storage, read_write> counts: array<atomic<u32>>;
-// Where the keys of each digit and block go: the number of keys before them.
+// Where the keys of each digit and block go; see `add_counts`.
 @group(0) @binding(7) var<storage, read_write> starts: array<u32>;
 
 // For each group and digit, a bit for each invocation whose key has the digit; then where the first of these keys
 // goes.
 var<workgroup> masks: array<atomic<u32>, 2048>;
 
-// Turns counts into starts. Each workgroup adds up all counts before its own: they are few and cached, and one
-// dispatch less saves more.
+// Turns counts into starts. Each workgroup has some digits, and its starts are numbers of keys with these digits. The
+// number of all of them comes behind all starts.
 @compute @workgroup_size(256)
-fn add_counts(
-    @builtin(workgroup_id) w: vec3u,
-    @builtin(num_workgroups) n: vec3u,
-    @builtin(local_invocation_index) t: u32,
-) {
-    let count = DIGITS * blocks();
-    let first = (w.y * n.x + w.x) * EACH * THREADS;
-    if (first >= count) {
-        return;
-    }
+fn add_counts(@builtin(workgroup_id) w: vec3u, @builtin(local_invocation_index) t: u32) {
+    let count = TOGETHER * blocks();
+    let first = w.x * count;
     let base = counts_at(radix.number, 0u, 0u);
-    var before = 0u;
-    for (var k = t; k < first; k += THREADS) {
-        before += atomicLoad(&counts[base + k]);
-    }
+    let each = (count + THREADS - 1u) / THREADS;
+    let begin = first + min(t * each, count);
+    let end = first + min(t * each + each, count);
     var own = 0u;
-    let begin = first + t * EACH;
-    let end = min(begin + EACH, count);
     for (var k = begin; k < end; k++) {
         own += atomicLoad(&counts[base + k]);
     }
-    _ = exclusive(t, before);
-    before = scan[THREADS - 1u];
-    workgroupBarrier();
-    before += exclusive(t, own);
+    var before = exclusive(t, own);
     for (var k = begin; k < end; k++) {
         starts[k] = before;
         before += atomicLoad(&counts[base + k]);
+    }
+    if (t == THREADS - 1u) {
+        starts[DIGITS * blocks() + w.x] = before;
     }
 }
 
@@ -78,7 +67,8 @@ fn scatter(
         return;
     }
     // Invocation t stands for digit t too: where the next key with that digit goes.
-    var next = starts[t * blocks() + block];
+    let keys = select(0u, starts[DIGITS * blocks() + t / TOGETHER], t % TOGETHER == TOGETHER - 1u);
+    var next = starts[t * blocks() + block] + exclusive(t, keys);
     for (var group = 0u; group < GROUPS; group++) {
         atomicStore(&masks[group * DIGITS + t], 0u);
     }
@@ -117,7 +107,7 @@ fn scatter(
             }
             keys_out[to] = key;
             values_out[to] = value;
-            if (radix.last == 0u) {
+            if (radix.number + 1u < params.passes) {
                 note_digit(radix.number + 1u, key, to);
             }
         }
