@@ -27,6 +27,7 @@ use bytemuck::{bytes_of, cast_slice};
 use sapwise::Aabb;
 use sapwise::error::{GpuError, GpuErrorKind};
 use sapwise::internals::{SampledBoxes, Workers};
+use std::sync::OnceLock;
 
 /// Bytes of a box.
 const BOX: u64 = size_of::<Aabb>() as u64;
@@ -244,53 +245,63 @@ impl Engine {
     /// Submits a frame, or a piece of one, and does not wait: several GPUs work at once.
     ///
     /// `ids` has the number of each box in the frame, with the highest bit set if this piece owns the pairs of the
-    /// box. `None`: `boxes` is the whole frame.
+    /// box. `None`: `boxes` is the whole frame. `plan` runs beside the copies.
     pub(super) fn start(
         &mut self,
         boxes: &[Aabb],
         ids: Option<&[u32]>,
-        params: Params,
+        plan: impl Fn(&Self) -> Params + Sync,
         workers: &Workers,
     ) -> Result<(), GpuError> {
+        let (boxes, numbers): (&[u8], &[u8]) = (cast_slice(boxes), ids.map_or(&[], cast_slice));
+        let ids_at = BOXES_AT as usize + boxes.len();
+        let end = ids_at + numbers.len();
+        self.upload.ensure(&self.gpu, end as u64)?;
+        let mut view = self.upload.writable(&self.gpu, end as u64)?;
+        let planned = OnceLock::new();
+        let beside = || {
+            planned.get_or_init(|| plan(self));
+        };
+        copy(boxes, view.slice(BOXES_AT as usize..ids_at), workers, beside);
+        view.slice(ids_at..end).copy_from_slice(numbers);
+        let params = planned.into_inner().unwrap_or_else(|| plan(self));
+        self.gpu.ends("planning and copying", Place::Host);
         self.prepare(&params, ids.is_some(), None)?;
-        self.submit(params, boxes, ids, workers)
+        let params = Params { piece: u32::from(ids.is_some()), ..params };
+        self.submit(view, params, [boxes.len(), numbers.len()].map(|bytes| bytes as u64))
     }
 
     /// Submits a frame of boxes that are on the GPU, and does not wait.
     pub(super) fn start_resident(&mut self, boxes: &wgpu::Buffer, params: Params) -> Result<(), GpuError> {
         self.prepare(&params, false, Some(boxes))?;
-        self.submit(params, &[], None, &Workers::one())
+        let view = self.upload.writable(&self.gpu, BOXES_AT)?;
+        self.submit(view, params, [0; 2])
     }
 
+    /// Submits a frame whose boxes and numbers, of so many bytes, are on the GPU or in `view`.
     fn submit(
         &mut self,
+        mut view: wgpu::BufferViewMut,
         mut params: Params,
-        boxes: &[Aabb],
-        ids: Option<&[u32]>,
-        workers: &Workers,
+        [boxes, ids]: [u64; 2],
     ) -> Result<(), GpuError> {
         let blocks_left = self.number(&mut params);
-        params.piece = u32::from(ids.is_some());
-        let (boxes, ids): (&[u8], &[u8]) = (cast_slice(boxes), ids.map_or(&[], cast_slice));
-        let ids_at = BOXES_AT + boxes.len() as u64;
-        let parts = [
-            (0, bytes_of(&params), self.params.buffer()),
-            (HEADER_AT, bytes_of(&Header::START), self.header.buffer()),
-            (BOXES_AT, boxes, self.boxes.buffer()),
-            (ids_at, ids, self.ids.buffer()),
-        ];
-        self.gpu.ends("planning", Place::Host);
-        let mut view = self.upload.writable(&self.gpu, ids_at + ids.len() as u64)?;
-        for (at, bytes, _) in parts {
-            copy(bytes, view.slice(at as usize..at as usize + bytes.len()), workers);
+        for (at, bytes) in [(0, bytes_of(&params)), (HEADER_AT as usize, bytes_of(&Header::START))] {
+            view.slice(at..at + bytes.len()).copy_from_slice(bytes);
         }
         drop(view);
-        self.gpu.ends("copying into staging", Place::Host);
+        let parts = [
+            (0, size_of::<Params>() as u64, self.params.buffer()),
+            (HEADER_AT, size_of::<Header>() as u64, self.header.buffer()),
+            (BOXES_AT, boxes, self.boxes.buffer()),
+            (BOXES_AT + boxes, ids, self.ids.buffer()),
+        ];
+        self.gpu.ends("preparing", Place::Host);
 
         let mut encoder = self.gpu.record();
         self.upload.unmap();
-        for (at, bytes, to) in parts.into_iter().filter(|(_, bytes, _)| !bytes.is_empty()) {
-            encoder.copy_buffer_to_buffer(self.upload.buffer(), at, to, 0, bytes.len() as u64);
+        for (at, bytes, to) in parts.into_iter().filter(|(_, bytes, _)| *bytes > 0) {
+            encoder.copy_buffer_to_buffer(self.upload.buffer(), at, to, 0, bytes);
         }
         self.record(&mut encoder, &params, Step::Sort);
         let sent = self.sendable();

@@ -58,8 +58,8 @@ impl Share {
         pairs: &mut Pairs,
         workers: &Workers,
     ) -> Result<(), Failure> {
-        let params = self.engine.plan(boxes.len() as u32, || Look::of(&SampledBoxes::from(boxes), plan.stats(boxes)));
-        self.engine.start(boxes, None, params, workers)?;
+        let look = || Look::of(&SampledBoxes::from(boxes), plan.stats(boxes));
+        self.engine.start(boxes, None, |engine| engine.plan(boxes.len() as u32, look), workers)?;
         self.engine.finish(pairs, workers)
     }
 
@@ -81,8 +81,9 @@ impl Share {
         }
         let Members { boxes, ids } = &self.members;
         self.work += (boxes.len() as f64).powf(self.engine.growth());
-        let params = self.engine.plan(boxes.len() as u32, || Look::at(&SampledBoxes::from(boxes.as_slice())));
-        self.failure = self.engine.start(boxes, Some(ids), params, &Workers::one()).err().map(Failure::Gpu);
+        let look = || Look::at(&SampledBoxes::from(boxes.as_slice()));
+        let plan = |engine: &Engine| engine.plan(boxes.len() as u32, look);
+        self.failure = self.engine.start(boxes, Some(ids), plan, &Workers::one()).err().map(Failure::Gpu);
     }
 
     /// Waits for the slab. The first of `rounds` slabs counts for the speed only if there are no others.

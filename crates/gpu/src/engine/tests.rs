@@ -42,7 +42,7 @@ fn plan(engine: &Engine, boxes: &[Aabb]) -> Params {
 }
 
 fn start(engine: &mut Engine, boxes: &[Aabb]) {
-    engine.start(boxes, None, plan(engine, boxes), &Workers::one()).unwrap();
+    engine.start(boxes, None, |engine| plan(engine, boxes), &Workers::one()).unwrap();
 }
 
 fn finish(engine: &mut Engine) -> Result<usize, Failure> {
@@ -63,8 +63,8 @@ fn rows_go_on_after_their_budget() {
         for method in SORTING {
             let mut engine = Engine::new(gpus.open(index).unwrap(), method).unwrap();
             for budget in [7, 100] {
-                let params = Params { budget, ..plan(&engine, &boxes) };
-                engine.start(&boxes, None, params, &Workers::one()).unwrap();
+                let plan = |engine: &Engine| Params { budget, ..plan(engine, &boxes) };
+                engine.start(&boxes, None, plan, &Workers::one()).unwrap();
                 let mut pairs = Pairs::with_order(PairOrder::Canonical);
                 engine.finish(&mut pairs, &Workers::one()).unwrap();
                 pairs.finish().unwrap();
