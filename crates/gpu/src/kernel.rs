@@ -44,9 +44,9 @@ pub(crate) mod source {
     pub(crate) const SAMPLE: Source = &[COMMON, INPUT, include_str!("shaders/sample.wgsl")];
     pub(crate) const SCAN: Source = &[COMMON, include_str!("shaders/scan.wgsl")];
     pub(crate) const SORT: Source = &[COMMON, PREFIX, include_str!("shaders/sort.wgsl"), DIGITS];
-    pub(crate) const GRID_SAP: Source = &[COMMON, ROWS, LEVELS, WALK, include_str!("shaders/grid_sap.wgsl")];
-    pub(crate) const BVH: Source = &[COMMON, ROWS, LEVELS, WALK, include_str!("shaders/bvh.wgsl")];
-    pub(crate) const SAP: Source = &[COMMON, ROWS, include_str!("shaders/sap.wgsl")];
+    pub(crate) const GRID_SAP: Source = &[COMMON, PREFIX, ROWS, LEVELS, WALK, include_str!("shaders/grid_sap.wgsl")];
+    pub(crate) const BVH: Source = &[COMMON, ROWS, LEVELS, include_str!("shaders/bvh.wgsl")];
+    pub(crate) const SAP: Source = &[COMMON, PREFIX, ROWS, include_str!("shaders/sap.wgsl")];
     pub(crate) const TREE: Source = &[COMMON, LEVELS, include_str!("shaders/tree.wgsl")];
 }
 

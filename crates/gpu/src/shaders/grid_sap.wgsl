@@ -7,6 +7,10 @@
 // A state with this bit is a position in the tree. Without it, it is the number of candidates tested so far.
 const WALKING: u32 = 0x80000000u;
 
+fn before(row: u32, t: u32, count: u32) -> u32 {
+    return exclusive(t, count);
+}
+
 fn first_state(row: u32) -> u32 {
     return 0u;
 }
@@ -25,15 +29,10 @@ fn search_cells(row: u32, a: Box, state: u32) -> u32 {
     // The lower bits of hi.w: slots from the first to the last covered one.
     let slots = (a.hi.w & 0x3fffffffu) + 1u;
     var passed = state;
-    let count = cells.x * cells.y;
-    var next = vec2u(table[corner], table[corner + slots]);
-    for (var k = 0u; k < count; k++) {
-        var j = next.x;
-        let candidates = next.y - j;
-        // The loads for the next cell overlap with the tests of this one.
-        let ahead = min(k + 1u, count - 1u);
-        let begins = corner + (ahead / cells.x * params.cells.x + ahead % cells.x) * params.slots;
-        next = vec2u(table[begins], table[begins + slots]);
+    for (var k = 0u; k < cells.x * cells.y; k++) {
+        let begins = corner + (k / cells.x * params.cells.x + k % cells.x) * params.slots;
+        var j = table[begins];
+        let candidates = table[begins + slots] - j;
         // Earlier submissions have tested these.
         let over = min(passed, candidates);
         passed -= over;

@@ -1,5 +1,5 @@
 // Counting and writing the pairs of sorted boxes, one row for each invocation. The next file defines the candidates
-// of a row: `search` calls `hit` for each pair.
+// of a row: `search` calls `hit` for each pair. Its `before` returns the number of pairs of the block before a row.
 //
 // A row is tested with `params.budget` candidates in one submission and goes on in the next. Drivers give up on a
 // dispatch that takes seconds, and some end loops silently: lavapipe after 65 535 turns of all loops of an invocation
@@ -89,21 +89,21 @@ fn count(@builtin(workgroup_id) w: vec3u, @builtin(num_workgroups) n: vec3u, @bu
 @compute @workgroup_size(64)
 fn write(@builtin(workgroup_id) w: vec3u, @builtin(num_workgroups) n: vec3u, @builtin(local_invocation_index) t: u32) {
     let block = w.y * n.x + w.x;
+    if (block >= params.blocks) {
+        return;
+    }
     let row = block * THREADS + t;
-    if (block >= params.blocks || row >= params.objects) {
-        return;
+    var count = 0u;
+    if (row < params.objects) {
+        count = rows[row];
     }
-    let count = rows[row];
-    if (count == 0u) {
-        return;
-    }
-    start = atomicLoad(&sums[block]) - params.window;
-    for (var k = block * THREADS; k < row; k++) {
-        start += rows[k];
-    }
+    start = atomicLoad(&sums[block]) + before(row, t, count) - params.window;
     if (count > KEPT) {
         writing = true;
         _ = test_row(row);
+        return;
+    }
+    if (count == 0u) {
         return;
     }
     let a = boxes[row].lo.w;

@@ -1,5 +1,9 @@
 // A row is tested with the boxes behind it, up to the first that begins after its end.
 
+fn before(row: u32, t: u32, count: u32) -> u32 {
+    return exclusive(t, count);
+}
+
 // The state is the position of the next candidate.
 fn first_state(row: u32) -> u32 {
     return row + 1u;
