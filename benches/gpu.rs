@@ -14,8 +14,8 @@
 //!
 //! The contestants take turns on each frame, so that a machine that slows down slows all of them. The speed-up is the
 //! median of the ratios frame by frame. The pairs of all contestants are compared in every frame, outside the timed
-//! part. A GPU that rests lowers its clocks, and in a program it would not rest: it runs untimed frames for 20 ms before
-//! each timed one. Bias: one scenario; four frames, there and back again.
+//! part. A GPU that rests lowers its clocks, and in a program it would not rest: before each timed frame it runs untimed
+//! ones for as long as it rested, up to half a second. Bias: one scenario; four frames, there and back again.
 //!
 //! Criterion can't interleave its candidates. Without `--bench`, which `cargo bench` passes, only the smallest size is
 //! run. Exit status 1 if a contestant failed or found other pairs.
@@ -27,9 +27,12 @@ use sapwise::algorithm::{Backend, usable_cores};
 use sapwise::{Aabb, AlgorithmId, BroadPhase, Pairs, Registry};
 use sapwise_gpu::{Gpu, Gpus, Resident, ResidentPairs, wgpu30 as wgpu};
 use sapwise_scenes::Scenario;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::hint::black_box;
 use std::io::Write;
 use std::process::ExitCode;
+use std::rc::Rc;
 use std::time::{Duration, Instant};
 
 const SIZES: [usize; 5] = [1_000, 10_000, 100_000, 1_000_000, 10_000_000];
@@ -46,8 +49,8 @@ const ROUNDS: usize = 60;
 /// Fewest rounds of a size, even if time runs out, so that there are quartiles.
 const FEWEST_ROUNDS: usize = 5;
 
-/// Time of the untimed frames before a timed one on a GPU.
-const STREAM: Duration = Duration::from_millis(20);
+/// Longest time of the untimed frames before a timed one on a GPU.
+const LONGEST_STREAM: Duration = Duration::from_millis(500);
 
 /// Time for all contestants at a size.
 const TIME: Duration = Duration::from_secs(15);
@@ -89,40 +92,61 @@ impl Contestant {
 }
 
 /// Returns a contestant from boxes in host memory to pairs in host memory.
-fn host_resident(mut algorithm: Box<dyn BroadPhase>, on_gpu: bool) -> Turn {
+fn host_resident(mut algorithm: Box<dyn BroadPhase>, gpus: Busy) -> Turn {
     let mut pairs = Pairs::new();
     Box::new(move |boxes| {
-        if on_gpu {
-            stream(|| algorithm.find_pairs(boxes, &mut pairs).map_err(|e| e.to_string()))?;
-        }
+        gpus.stream(|| algorithm.find_pairs(boxes, &mut pairs).map_err(|e| e.to_string()))?;
         let start = Instant::now();
         algorithm.find_pairs(black_box(boxes), &mut pairs).map_err(|e| e.to_string())?;
         let elapsed = start.elapsed();
+        gpus.worked();
         Ok((elapsed, pairs.fingerprint()))
     })
 }
 
-/// Runs frames until a GPU that rested has its clocks up.
-fn stream(mut frame: impl FnMut() -> Result<(), String>) -> Result<(), String> {
-    let start = Instant::now();
-    while start.elapsed() < STREAM {
-        frame()?;
+/// GPUs that take turns, and when each last worked.
+#[derive(Clone, Default)]
+struct Busy {
+    gpus: Vec<u32>,
+    last: Rc<RefCell<BTreeMap<u32, Instant>>>,
+}
+
+impl Busy {
+    fn of(&self, backend: &Backend) -> Self {
+        let gpus = if let Backend::Gpu(indices) = backend { indices.clone() } else { Vec::new() };
+        Self { gpus, last: Rc::clone(&self.last) }
     }
-    Ok(())
+
+    /// Runs frames until the clocks of GPUs that rested are up.
+    fn stream(&self, mut frame: impl FnMut() -> Result<(), String>) -> Result<(), String> {
+        let rested = |gpu| self.last.borrow().get(gpu).map_or(LONGEST_STREAM, Instant::elapsed).min(LONGEST_STREAM);
+        let wanted = self.gpus.iter().map(rested).max().unwrap_or_default();
+        let start = Instant::now();
+        while start.elapsed() < wanted {
+            frame()?;
+        }
+        Ok(())
+    }
+
+    /// Notes that they have just worked.
+    fn worked(&self) {
+        self.last.borrow_mut().extend(self.gpus.iter().map(|&gpu| (gpu, Instant::now())));
+    }
 }
 
 /// Returns a contestant from boxes on a GPU to pairs on it. The transfers are not timed.
-fn device_resident(gpus: &Gpus, index: u32, method: &str) -> Result<Turn, String> {
+fn device_resident(gpus: &Gpus, index: u32, method: &str, busy: Busy) -> Result<Turn, String> {
     let gpu = gpus.open(index).map_err(|e| e.to_string())?;
     let mut resident = Resident::new(&gpu, method).map_err(|e| e.to_string())?;
     let mut on_gpu = None;
     Ok(Box::new(move |boxes| {
         let buffer = upload(&gpu, boxes, on_gpu.take())?;
-        stream(|| resident.find_pairs(&buffer, boxes.len() as u32).map(drop).map_err(|e| e.to_string()))?;
+        busy.stream(|| resident.find_pairs(&buffer, boxes.len() as u32).map(drop).map_err(|e| e.to_string()))?;
         let start = Instant::now();
         let pairs = resident.find_pairs(&buffer, boxes.len() as u32).map_err(|e| e.to_string())?;
         let elapsed = start.elapsed();
         let fingerprint = download(&gpu, pairs)?;
+        busy.worked();
         on_gpu = Some(buffer);
         Ok((elapsed, fingerprint))
     }))
@@ -299,19 +323,19 @@ fn bench() -> Result<Vec<String>, String> {
     cpu.dedup();
     let cpu = cpu.into_iter().map(|k| AlgorithmId::new("grid-sap", Backend::Cpu(k)).map_err(|e| e.to_string()));
     let mut contestants = Vec::new();
+    let busy = Busy::default();
     for id in cpu.chain(on_gpus(&registry)?.into_iter().map(Ok)) {
         let id = id?;
         match registry.create(&id) {
             Ok(algorithm) => {
-                let on_gpu = matches!(id.backend(), Backend::Gpu(_));
-                contestants.push(Contestant::new(id.clone(), "host", host_resident(algorithm, on_gpu)));
+                contestants.push(Contestant::new(id.clone(), "host", host_resident(algorithm, busy.of(id.backend()))));
             }
             Err(error) => remarks.push(error.to_string()),
         }
         if let Backend::Gpu(indices) = id.backend()
             && let &[index] = indices.as_slice()
         {
-            match device_resident(&gpus, index, id.method()) {
+            match device_resident(&gpus, index, id.method(), busy.of(id.backend())) {
                 Ok(turn) => contestants.push(Contestant::new(id, "device", turn)),
                 Err(error) => remarks.push(format!("{id} (device): {error}")),
             }

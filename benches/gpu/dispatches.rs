@@ -195,7 +195,7 @@ fn median(samples: &mut [f64]) -> f64 {
 
 /// Returns the fewest bytes that the dispatches of a kernel read and write in a frame: whole sectors of 32 bytes where
 /// boxes come in random order. `None` for small kernels. A cell of the grid is counted for each box.
-fn bytes(method: &str, kernel: &str, boxes: usize, pairs: usize) -> Option<f64> {
+fn bytes(method: &str, kernel: &str, dispatches: usize, boxes: usize, pairs: usize) -> Option<f64> {
     let of_box = match (method, kernel) {
         // Box; key, reach and rank; count.
         (_, "cell_keys") => 24 + 12 + 8,
@@ -204,20 +204,20 @@ fn bytes(method: &str, kernel: &str, boxes: usize, pairs: usize) -> Option<f64> 
         (_, "begin") => 8,
         // Key, rank; beginning; position.
         (_, "put") => 12 + 4 + 4,
-        // Four passes: key and value, in and out.
-        (_, "scatter") => 12 + 3 * 16,
+        // Key and value, in and out; the first pass reads no value.
+        (_, "scatter") => 16 * dispatches - 4,
         (_, "gather") => 4 + 32 + 32,
         (_, "gather_cells") => 4 + 32 + 32 + 8 + 32 + 4,
         ("bvh", "raise_all") => 32 + 4,
         // Box, cell and table or tree; number and state of the row.
         (_, "count") => 32 + 8 + 8,
-        // Number, kept pairs, number of the box.
-        (_, "write") => 4 + 16 + 32,
+        (_, "write") => 4,
         _ => return None,
     };
     let of_pair = match kernel {
         "count" => 4,
-        "write" => 8,
+        // Kept pair, sector of the box, pair.
+        "write" => 4 + 32 + 8,
         _ => 0,
     };
     Some((of_box * boxes + of_pair * pairs) as f64)
@@ -252,7 +252,7 @@ fn table(
     let mut all = 0.0;
     for (name, count, seconds) in by_name(&on_gpu) {
         all += seconds;
-        let bound = bytes(method, name, boxes, pairs).map_or("| - | - | - |".to_owned(), |bytes| {
+        let bound = bytes(method, name, count as usize, boxes, pairs).map_or("| - | - | - |".to_owned(), |bytes| {
             let least = bytes / bandwidth;
             let over = seconds / (least + f64::from(count) * dispatch);
             format!("| {:.2} | {:.1} | {over:.1} |", bytes * 1e-6, least * 1e6)
