@@ -14,8 +14,8 @@
 //!
 //! The contestants take turns on each frame, so that a machine that slows down slows all of them. The speed-up is the
 //! median of the ratios frame by frame. The pairs of all contestants are compared in every frame, outside the timed
-//! part. A GPU that rests lowers its clocks, and in a program it would not rest: before each timed frame it runs untimed
-//! ones for as long as it rested, up to half a second. Bias: one scenario; four frames, there and back again.
+//! part. A GPU that rests lowers its clocks, and in a program it would not rest: before each timed frame it runs
+//! untimed ones for as long as it rested, up to half a second. Bias: one scenario; four frames, there and back again.
 //!
 //! Criterion can't interleave its candidates. Without `--bench`, which `cargo bench` passes, only the smallest size is
 //! run. Exit status 1 if a contestant failed or found other pairs.

@@ -88,8 +88,8 @@ const FEWEST_OF_ROW: u32 = 1 << 10;
 const CURVE_CELLS: f64 = 1024.0;
 const CELLS_OF_BOX: f64 = 2.0;
 
-/// Bits of a key for the size of the box, and those beyond the ones that would number the boxes: two more, because cells
-/// have unequal numbers of boxes.
+/// Bits of a key for the size of the box, and those beyond the ones that would number the boxes: two more, because
+/// cells have unequal numbers of boxes.
 const SIZE_BITS: u32 = 2;
 const BITS_BEYOND: u32 = SIZE_BITS + 2;
 

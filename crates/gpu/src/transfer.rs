@@ -27,8 +27,8 @@ const NOT_MAPPED: &str = "the driver refuses to map memory";
 /// Bytes that a worker copies at once.
 const COPIED: usize = 64 << 10;
 
-/// Copies to mapped memory, with several threads if there is much, of which one does `beside`: on an NVIDIA H200 one thread writes 15 GB/s over the
-/// bus, and four write 32.
+/// Copies to mapped memory, with several threads if there is much, of which one does `beside`: on an NVIDIA H200 one
+/// thread writes 15 GB/s over the bus, and four write 32.
 pub(super) fn copy(bytes: &[u8], to: wgpu::WriteOnly<'_, [u8]>, workers: &Workers, beside: impl Fn() + Sync) {
     let (chunks, mut rest) = to.into_chunks::<COPIED>();
     // Only chunks of a fixed size may change threads.

@@ -26,7 +26,8 @@ fn bit(a: Box, at: u32) -> u32 {
     return u32(a.lo.x <= b.hi.x && b.lo.x <= a.hi.x && overlap_across(a, b));
 }
 
-// Tests the eight boxes or nodes around `at`, of the level that begins at `first`. Returns a bit for each that overlaps.
+// Tests the eight boxes or nodes around `at`, of the level that begins at `first`. Returns a bit for each that
+// overlaps.
 fn eight(a: Box, first: u32, at: u32, level: u32) -> u32 {
     left -= min(left, 8u);
     let group = at & ~7u;

@@ -53,5 +53,6 @@ fn curve(at: u32) -> u32 {
     let longest = max(max(extent.x, extent.y), extent.z) * params.usual;
     let size = u32(longest > 8.0) + u32(longest > 64.0) + u32(longest > 512.0);
     let middle = low + extent * 0.5;
-    return (size << params.curve_bits) | hilbert(vec3u(cell(middle.x, 0u), cell(middle.y, PARTS), cell(middle.z, 2u * PARTS)));
+    let place = vec3u(cell(middle.x, 0u), cell(middle.y, PARTS), cell(middle.z, 2u * PARTS));
+    return (size << params.curve_bits) | hilbert(place);
 }
