@@ -3,7 +3,7 @@
 # with a tuning that was predicted, measured, or measured on another machine.
 #
 #     tools/in-line.sh OTHER.json [DIR]
-#     tools/in-line.sh datasets/intel-xeon-2c/full.json
+#     tools/in-line.sh datasets/amd-epyc-zen3-2c/full.json
 #
 # OTHER.json is the report of another host: its tuning is wrong here, and the runs show how it is corrected. Texts,
 # traces and pictures go into DIR (`in-line` by default) with a table of all runs, `summary.txt`; a report.json that is

@@ -63,9 +63,9 @@ pub(crate) enum Create {
 
 /// Every method, the simplest first.
 pub(crate) const METHODS: &[Method] = &[
-    Method { name: "brute", revision: 3, create: Create::OneWidth(brute::create) },
-    Method { name: "sap", revision: 3, create: Create::OneWidth(sap::create) },
-    Method { name: "grid-sap", revision: 3, create: Create::OneWidth(grid_sap::create) },
-    Method { name: "bvh", revision: 1, create: Create::OneWidth(bvh::create) },
-    Method { name: "pair-cache", revision: 3, create: Create::AnyWidth(pair_cache::create) },
+    Method { name: "brute", revision: 4, create: Create::OneWidth(brute::create) },
+    Method { name: "sap", revision: 4, create: Create::OneWidth(sap::create) },
+    Method { name: "grid-sap", revision: 4, create: Create::OneWidth(grid_sap::create) },
+    Method { name: "bvh", revision: 2, create: Create::OneWidth(bvh::create) },
+    Method { name: "pair-cache", revision: 4, create: Create::AnyWidth(pair_cache::create) },
 ];
