@@ -136,7 +136,7 @@ fn compare(
             len += 1;
         }
         columns.resize(len)?;
-        brute_rows(simd, columns, 0..few.len(), few.len(), pairs);
+        brute_rows(simd, columns, 0..few.len(), |_| few.len(), pairs);
     }
     Ok(())
 }

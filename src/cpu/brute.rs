@@ -54,7 +54,7 @@ impl BroadPhase for Brute {
         let active = active.unwrap_or(boxes.len());
         outputs.find(workers, pairs, |k, parts, list| {
             let row = |k: usize| row(active, boxes.len(), k, parts);
-            brute_rows(*simd, columns, row(k)..row(k + 1), 0, list);
+            brute_rows(*simd, columns, row(k)..row(k + 1), |row| row + 1, list);
         });
         pairs.finish_on(workers)
     }

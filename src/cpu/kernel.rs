@@ -52,8 +52,14 @@ pub(crate) fn sweep_rows<R: Rows>(simd: Simd, columns: &Columns, rows: Range<usi
     }
 }
 
-/// Tests every row of `rows` against all rows behind it, from row `from` on, on all three axes, and adds the pairs.
-pub(crate) fn brute_rows(simd: Simd, columns: &Columns, rows: Range<usize>, from: usize, pairs: &mut Pairs) {
+/// Tests every row of `rows` against all rows from `first` of it on, on all three axes, and adds the pairs.
+pub(crate) fn brute_rows(
+    simd: Simd,
+    columns: &Columns,
+    rows: Range<usize>,
+    first: impl Fn(usize) -> usize,
+    pairs: &mut Pairs,
+) {
     if pairs.is_any_over() {
         return;
     }
@@ -61,11 +67,11 @@ pub(crate) fn brute_rows(simd: Simd, columns: &Columns, rows: Range<usize>, from
     match simd {
         // SAFETY: the proof says that this CPU has the instructions.
         #[cfg(target_arch = "x86_64")]
-        Simd::Avx512(proof) => unsafe { x86::brute_avx512(proof, &view, rows, from, pairs) },
+        Simd::Avx512(proof) => unsafe { x86::brute_avx512(proof, &view, rows, first, pairs) },
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
-        Simd::Avx2(proof) => unsafe { x86::brute_avx2(proof, &view, rows, from, pairs) },
-        Simd::Portable => brute(Baseline, &view, rows, from, pairs),
+        Simd::Avx2(proof) => unsafe { x86::brute_avx2(proof, &view, rows, first, pairs) },
+        Simd::Portable => brute(Baseline, &view, rows, first, pairs),
     }
 }
 
@@ -215,11 +221,11 @@ fn sweep<L: Lanes, R: Rows>(lanes: L, view: &View<'_>, rows: Range<usize>, pairs
 }
 
 #[inline(always)]
-fn brute<L: Lanes>(lanes: L, view: &View<'_>, rows: Range<usize>, from: usize, pairs: &mut Pairs) {
+fn brute<L: Lanes>(lanes: L, view: &View<'_>, rows: Range<usize>, first: impl Fn(usize) -> usize, pairs: &mut Pairs) {
     debug_assert!(rows.end <= view.len);
     for i in rows {
         let query = view.query(i);
-        let mut at = from.max(i + 1);
+        let mut at = first(i);
         while at < view.len {
             // SAFETY: `at < view.len`; the caller enabled the instructions of `L`.
             let hits = unsafe { lanes.reach_and_hits(view, at, &query).1 & lanes.ends_after(view, at, query.low[0]) };
@@ -319,7 +325,8 @@ mod tests {
             pairs.set_filter(Some(Filter::new((0..1000).map(ground).collect())));
             pairs
         };
-        let brute_rows = |simd, columns: &Columns, rows, pairs: &mut Pairs| brute_rows(simd, columns, rows, 0, pairs);
+        let brute_rows =
+            |simd, columns: &Columns, rows, pairs: &mut Pairs| brute_rows(simd, columns, rows, |row| row + 1, pairs);
         for search in [&sweep_rows::<All> as &dyn Fn(Simd, &Columns, Range<usize>, &mut Pairs), &brute_rows] {
             let mut pairs = whole.clone();
             search(Simd::Portable, &columns, 0..1000, &mut pairs);
@@ -354,7 +361,7 @@ mod tests {
         let view = View::new(&columns);
         let (mut swept, mut tested) = (Pairs::new(), Pairs::new());
         sweep::<_, All>(portable::Portable, &view, 0..boxes.len(), &mut swept);
-        brute(portable::Portable, &view, 0..boxes.len(), 0, &mut tested);
+        brute(portable::Portable, &view, 0..boxes.len(), |row| row + 1, &mut tested);
         assert_eq!(swept.fingerprint(), expected.fingerprint());
         assert_eq!(tested.fingerprint(), expected.fingerprint());
     }

@@ -194,8 +194,14 @@ pub(super) fn sweep_avx2<R: Rows>(proof: Avx2, view: &View<'_>, rows: Range<usiz
 }
 
 #[target_feature(enable = "avx2")]
-pub(super) fn brute_avx2(proof: Avx2, view: &View<'_>, rows: Range<usize>, from: usize, pairs: &mut Pairs) {
-    brute(proof, view, rows, from, pairs);
+pub(super) fn brute_avx2(
+    proof: Avx2,
+    view: &View<'_>,
+    rows: Range<usize>,
+    first: impl Fn(usize) -> usize,
+    pairs: &mut Pairs,
+) {
+    brute(proof, view, rows, first, pairs);
 }
 
 #[target_feature(enable = "avx512f")]
@@ -204,8 +210,14 @@ pub(super) fn sweep_avx512<R: Rows>(proof: Avx512, view: &View<'_>, rows: Range<
 }
 
 #[target_feature(enable = "avx512f")]
-pub(super) fn brute_avx512(proof: Avx512, view: &View<'_>, rows: Range<usize>, from: usize, pairs: &mut Pairs) {
-    brute(proof, view, rows, from, pairs);
+pub(super) fn brute_avx512(
+    proof: Avx512,
+    view: &View<'_>,
+    rows: Range<usize>,
+    first: impl Fn(usize) -> usize,
+    pairs: &mut Pairs,
+) {
+    brute(proof, view, rows, first, pairs);
 }
 
 #[target_feature(enable = "avx2")]
