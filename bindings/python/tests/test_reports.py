@@ -60,7 +60,7 @@ def test_all_reports_and_their_hosts():
     for hardware in (json.loads(f.read_text())["hardware"] for f in files):
         clock = next(p["value"] for p in hardware["parameters"] if p["name"] == "clock_reported_ghz")
         known.add((hardware["machine"]["physical_id"], round(1000 * clock)))
-    assert len(np.unique(table["host"].astype(str))) == len(known) >= 3
+    assert len(np.unique(table["host"].astype(str))) == len(known) >= 2
     expected = sum(len(p["timings"]) for f in files for p in json.loads(f.read_text())["points"])
     assert len(table) == expected
 
