@@ -8,7 +8,8 @@ use crate::load::SceneStats;
 use crate::pairs::Pairs;
 use crate::registry::Registry;
 
-/// Most boxes of the shorter list that are compared with every box of the longer one. With more, it pays to sort.
+/// Most boxes of the shorter list without a tree: they are compared with each box of the longer list that overlaps
+/// their bounds. With more, it pays to sort.
 const FEW: usize = 256;
 
 /// Boxes that are compared with one box in the time that `grid-sap` takes for a box, in round numbers.
@@ -17,8 +18,8 @@ const COMPARED: usize = 16;
 /// Boxes of the longer list that are turned into columns at a time: they stay in the first-level cache.
 const COLUMNS: usize = 512;
 
-/// Finds the pairs of a box of one list and a box of another, such as tools and parts. Boxes of the same list are no
-/// pair.
+/// Finds the overlapping pairs between two lists, such as tools and parts. Boxes of one list never pair with each
+/// other.
 ///
 /// ```
 /// use sapwise::{Aabb, Between, Pairs, Registry};
@@ -29,11 +30,10 @@ const COLUMNS: usize = 512;
 /// let mut between = Between::new(&Registry::new())?;
 /// let mut pairs = Pairs::new();
 /// between.find_pairs(&tools, &parts, &mut pairs)?;
-/// // Positions count on from the first list to the second.
+/// // Positions run through the first list, then continue through the second.
 /// assert_eq!(pairs.as_slice(), [(0, 2)]);
 /// # Ok::<(), sapwise::Error>(())
 /// ```
-///
 #[derive(Debug)]
 pub struct Between {
     workers: Workers,
@@ -63,7 +63,8 @@ impl Between {
 
     /// Replaces the content of `pairs` with the overlapping pairs of a box of `a` and a box of `b`.
     ///
-    /// Pairs, the filter of `pairs` and errors count positions in `a`, then on in `b`.
+    /// Positions in pairs, in the filter of `pairs` and in errors run through `a`, then continue through `b`: `b[0]`
+    /// has position `a.len()`.
     ///
     /// # Errors
     /// Those of [`BroadPhase::find_pairs`](crate::BroadPhase::find_pairs).
@@ -115,7 +116,8 @@ impl Between {
     }
 }
 
-/// Compares each of a few boxes with each of many. Each list comes with the position of its first box.
+/// Compares each of a few boxes with each of many that overlaps the bounds of the few. Each list comes with the
+/// position of its first box.
 fn compare(
     simd: Simd,
     (few, of_few): (&[Aabb], u32),

@@ -1,4 +1,4 @@
-//! A space as it is saved: what the caller has told it, and what the next update compares with. Trees are built anew.
+//! The saved form of a space: its bodies, and the state that the next update compares with. Trees are rebuilt.
 
 use super::body::Body;
 use super::handle::Handle;
@@ -15,8 +15,8 @@ struct Snapshot {
     slots: Vec<Slot>,
     /// The slots without a body. The last one is used first.
     free: Vec<u32>,
-    /// The slots of the pairs of the last update, the lower one first. Those of two resting bodies are in the order of
-    /// [`Space::pairs`], all others ascend.
+    /// By slot, the lower one first, as of the last update. First the pairs of two resting bodies, in the order of
+    /// [`Space::pairs`]; then all others, ascending.
     pairs: Vec<(u32, u32)>,
     begun: Vec<(Handle, Handle)>,
     ended: Vec<(Handle, Handle)>,
@@ -24,7 +24,7 @@ struct Snapshot {
 
 #[derive(serde::Serialize, serde::Deserialize)]
 struct Slot {
-    /// Without a body, that of the next one.
+    /// Of the body in the slot; if the slot is free, of the next one.
     generation: u32,
     held: Option<Held>,
 }
@@ -41,11 +41,11 @@ struct Held {
     removed: bool,
 }
 
-/// What a body was in the last update.
+/// The state of a body after the last update.
 #[derive(Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Stage {
-    /// Not there yet.
+    /// Inserted since.
     New,
     /// Not set for this number of updates. Beyond [`IDLE`] the number makes no difference.
     Active(u64),
@@ -87,7 +87,7 @@ impl Snapshot {
         }
     }
 
-    /// Returns the space, or what is wrong.
+    /// Returns the space, or a description of the defect.
     fn restore(self) -> Result<Space, String> {
         let mut space = Space::new();
         space.update = IDLE;
