@@ -79,12 +79,13 @@ impl Between {
         let Self { workers, simd, columns, tree, outputs } = self;
         let workers = &workers.fit(work);
         let _frame = workers.frame();
-        workers.check(a)?;
-        workers.check(b).map_err(|error| match error {
+        let of_b = |error| match error {
             Error::InvalidBox { index, defect } => Error::InvalidBox { index: a.len() + index, defect },
             other => other,
-        })?;
+        };
         if compares {
+            workers.check(a)?;
+            workers.check(b).map_err(of_b)?;
             if columns.len() < workers.tasks() {
                 columns.resize_with(workers.tasks(), || (Columns::default(), Ok(())));
             }
@@ -99,7 +100,7 @@ impl Between {
             })?;
         } else {
             tree.build(workers, a, Members::From(0), &SceneStats::of(a), pairs.screen())?;
-            tree.sort_others(workers, b)?;
+            tree.sort_others(workers, b).map_err(of_b)?;
             let sorted = tree.others();
             outputs.find(workers, pairs, |k, parts, list| {
                 for keys in sorted[part(sorted.len(), k, parts)].chunks(LANES) {

@@ -2,21 +2,15 @@
 
 mod common;
 
-use common::{Random, naive_filtered};
-use sapwise::algorithm::SimdLevel;
-use sapwise::{Aabb, Between, Error, Filter, Membership, PairOrder, Pairs, Registry};
+use common::{Random, naive_filtered, registries};
+use sapwise::{Aabb, Between, Error, Filter, Membership, PairOrder, Pairs};
 
 /// Returns a search at every SIMD level, on one thread and on two.
 fn every_search() -> Vec<(String, Between)> {
-    let mut all = Vec::new();
-    for level in SimdLevel::ALL.into_iter().filter(|&l| l <= SimdLevel::detected()) {
-        for cores in [1, 2] {
-            let mut registry = Registry::with_cores(cores);
-            registry.limit_simd(level);
-            all.push((format!("{level}, {cores} threads"), Between::new(&registry).unwrap()));
-        }
-    }
-    all
+    let of = |cores| {
+        registries(cores).map(move |(level, r)| (format!("{level}, {cores} threads"), Between::new(&r).unwrap()))
+    };
+    [1, 2].into_iter().flat_map(of).collect()
 }
 
 #[test]
@@ -62,18 +56,21 @@ fn pairs_are_those_of_the_double_loop() {
 
 #[test]
 fn errors_count_on_from_the_first_list_to_the_second() {
-    let boxes = Random(3).cubes(50, [9.0; 3], 0.5);
-    let mut invalid = boxes.clone();
-    invalid[7].min[1] = f32::NAN;
     let mut pairs = Pairs::new();
-    for (_, mut search) in every_search() {
+    // Lists that are compared, and lists that stand in a tree.
+    for (count, (_, mut search)) in
+        [50, 300].into_iter().flat_map(|count| every_search().into_iter().map(move |s| (count, s)))
+    {
+        let boxes = Random(3).cubes(count, [9.0; 3], 0.5);
+        let mut invalid = boxes.clone();
+        invalid[7].min[1] = f32::NAN;
         let mut index = |a: &[Aabb], b: &[Aabb]| match search.find_pairs(a, b, &mut pairs) {
             Err(Error::InvalidBox { index, .. }) => index,
             other => panic!("{other:?}"),
         };
         assert_eq!(
             [index(&invalid, &boxes), index(&boxes, &invalid), index(&boxes[..2], &invalid), index(&invalid, &[])],
-            [7, 57, 9, 7]
+            [7, count + 7, 9, 7]
         );
         pairs.set_limit(Some(3));
         assert_eq!(search.find_pairs(&boxes, &boxes, &mut pairs), Err(Error::TooManyPairs { limit: 3 }));

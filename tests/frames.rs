@@ -2,16 +2,13 @@
 
 mod common;
 
-use common::{Random, naive};
-use sapwise::algorithm::SimdLevel;
+use common::{Random, naive, registries};
 use sapwise::{Aabb, BroadPhase, Error, PairOrder, Pairs, Registry};
 
 /// Returns every method on one and on three threads at every SIMD level of this machine.
 fn every_algorithm() -> Vec<(String, Box<dyn BroadPhase>)> {
     let mut all = Vec::new();
-    for level in SimdLevel::ALL.into_iter().filter(|&l| l <= SimdLevel::detected()) {
-        let mut registry = Registry::with_cores(3);
-        registry.limit_simd(level);
+    for (level, registry) in registries(3) {
         for id in registry.available().into_iter().map(|e| e.id) {
             if id.threads() != 2 {
                 all.push((format!("{id} at {level}"), registry.create(&id).unwrap()));

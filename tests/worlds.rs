@@ -2,22 +2,16 @@
 
 mod common;
 
-use common::{Random, every_algorithm, naive_filtered};
-use sapwise::algorithm::SimdLevel;
+use common::{Random, every_algorithm, naive_filtered, registries};
 use sapwise::internals::Pair;
-use sapwise::{Aabb, Error, Filter, Membership, PairOrder, Pairs, Registry, Worlds};
+use sapwise::{Aabb, Error, Filter, Membership, PairOrder, Pairs, Worlds};
 
 /// Returns [`Worlds`] at every SIMD level, on one thread and on two.
 fn every_search() -> Vec<(String, Worlds)> {
-    let mut all = Vec::new();
-    for level in SimdLevel::ALL.into_iter().filter(|&l| l <= SimdLevel::detected()) {
-        for cores in [1, 2] {
-            let mut registry = Registry::with_cores(cores);
-            registry.limit_simd(level);
-            all.push((format!("{level}, {cores} threads"), Worlds::new(&registry).unwrap()));
-        }
-    }
-    all
+    let of = |cores| {
+        registries(cores).map(move |(level, r)| (format!("{level}, {cores} threads"), Worlds::new(&r).unwrap()))
+    };
+    [1, 2].into_iter().flat_map(of).collect()
 }
 
 /// Returns the boxes of worlds of `counts` boxes, and the starts. Some boxes are large, infinite or appear twice.

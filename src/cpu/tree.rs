@@ -417,6 +417,9 @@ impl Tree {
 
     /// Sorts boxes that are not in the tree along its curve. Until it is built again, [`others`](Self::others) returns
     /// them.
+    ///
+    /// # Errors
+    /// As [`build`](Self::build).
     pub(crate) fn sort_others(&mut self, workers: &Workers, boxes: &[Aabb]) -> Result<(), Error> {
         let curve = self.curve.take().unwrap_or_else(|| Curve::over(&SceneStats::of(boxes), boxes.len()));
         self.order.sort(workers, boxes, Members::From(0), &curve, None).map(drop)

@@ -46,12 +46,19 @@ fn along(boxes: &[Aabb], axis: usize) -> (Vec<u32>, Vec<usize>) {
     (order, ends)
 }
 
+/// Returns a registry of that many cores at every SIMD level of this machine.
+pub(crate) fn registries(cores: u32) -> impl Iterator<Item = (SimdLevel, Registry)> {
+    SimdLevel::ALL.into_iter().filter(|&level| level <= SimdLevel::detected()).map(move |level| {
+        let mut registry = Registry::with_cores(cores);
+        registry.limit_simd(level);
+        (level, registry)
+    })
+}
+
 /// Returns every method on 1, 2, 3 and 7 threads at every SIMD level of this machine.
 pub(crate) fn every_algorithm() -> Vec<(String, Box<dyn BroadPhase>)> {
     let mut all = Vec::new();
-    for level in SimdLevel::ALL.into_iter().filter(|&l| l <= SimdLevel::detected()) {
-        let mut registry = Registry::with_cores(7);
-        registry.limit_simd(level);
+    for (level, registry) in registries(7) {
         let ones = registry.entries().iter().filter(|e| e.id.threads() == 1);
         let methods: Vec<String> = ones.map(|e| e.id.method().to_owned()).collect();
         for method in methods {
