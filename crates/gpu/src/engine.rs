@@ -184,7 +184,6 @@ impl Engine {
         let mut grown = false;
         if external.is_none() {
             grown |= self.boxes.ensure(gpu, n * BOX)?;
-            self.upload.ensure(gpu, BOXES_AT + n * (BOX + if ids { 4 } else { 0 }))?;
         } else {
             self.upload.ensure(gpu, BOXES_AT)?;
         }
@@ -278,7 +277,7 @@ impl Engine {
         self.submit(view, params, [0; 2])
     }
 
-    /// Submits a frame whose boxes and numbers, of so many bytes, are on the GPU or in `view`.
+    /// Submits a frame. `view` holds so many bytes of boxes and of their numbers: none if the boxes are on the GPU.
     fn submit(
         &mut self,
         mut view: wgpu::BufferViewMut,
