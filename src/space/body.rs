@@ -70,6 +70,12 @@ impl Body {
         self.user_data
     }
 
+    /// Returns whether the body was made by [`kinematic`](Self::kinematic).
+    #[must_use]
+    pub fn is_kinematic(&self) -> bool {
+        self.kinematic
+    }
+
     /// Returns whether the body rests at once, and not only after some frames in which it was not set.
     pub(super) fn rests_at_once(&self) -> bool {
         self.membership.fixed && !self.kinematic

@@ -7,9 +7,10 @@ use std::num::NonZeroU64;
 /// has had four billion bodies. Handles of two spaces may be equal: don't mix them.
 ///
 /// 64 bits: slot, then generation. Handles sort by slot. 0 is no handle, so `Option<Handle>` has 64 bits too. With the
-/// feature `serde`, a handle is this number.
+/// feature `serde`, a handle is this number. In memory it is a [`NonZeroU64`].
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[repr(transparent)]
 pub struct Handle(NonZeroU64);
 
 impl Handle {

@@ -27,7 +27,9 @@ impl Space {
         View::of(self, Some(body))
     }
 
-    fn all(&self) -> View<'_> {
+    /// Returns a view of all bodies.
+    #[must_use]
+    pub fn all(&self) -> View<'_> {
         View::of(self, None)
     }
 
