@@ -2,6 +2,10 @@
 
 #[cfg(feature = "serde")]
 mod bounds;
+#[cfg(feature = "glam-034")]
+mod glam_034;
+#[cfg(feature = "mint")]
+mod mint;
 
 use crate::error::{BoxDefect, Error};
 

@@ -37,6 +37,7 @@
 //!
 //! - `parallel` (default): algorithms on several cores, with rayon. Without it only `@cpu1`, and no dependency.
 //! - `serde`: tunings, and a [`Space`] with all that is in it, can be serialised.
+//! - `mint`, `glam-034`: an [`Aabb`] and a [`Ray`] from two points or vectors of these crates, and back.
 //! - `tracing`: an event for each switch of `Adaptive`, with its reason.
 //! - `schema`, `bytemuck`, `long-tests`: for the other crates of this repository and its tests.
 
