@@ -1,0 +1,127 @@
+//! Boxes in the memory of a caller.
+
+use crate::arrays::{check, put, slice};
+use crate::status::{Failure, call, sw_status, sw_status::*};
+use sapwise::{Aabb, Error};
+use std::marker::PhantomData;
+
+/// Three floats of a caller.
+type Corner = [f32; 3];
+
+// An `Aabb` is six floats, minimum then maximum, and nothing else.
+const _: () = assert!(size_of::<Aabb>() == 24 && align_of::<Aabb>() == 4 && std::mem::offset_of!(Aabb, max) == 12);
+
+/// Borrows a box of a caller: six floats, minimum then maximum.
+///
+/// # Safety
+/// `bounds` is NULL, misaligned, or points to six floats.
+pub(crate) unsafe fn one<'a>(bounds: *const f32, what: &str) -> Result<&'a Aabb, Failure> {
+    check(bounds, 1, what)?;
+    // SAFETY: of the caller. Every bit pattern is a float.
+    Ok(unsafe { &*bounds.cast() })
+}
+
+/// Reads a point or a vector of a caller.
+///
+/// # Safety
+/// As [`one`], with three floats.
+pub(crate) unsafe fn corner(floats: *const f32, what: &str) -> Result<Corner, Failure> {
+    check(floats, 1, what)?;
+    // SAFETY: of the caller.
+    Ok(unsafe { *floats.cast() })
+}
+
+/// Boxes that lie `stride` bytes apart: each with its maximum behind its minimum, or with the maxima in an array of
+/// their own.
+#[derive(Clone, Copy)]
+pub(crate) struct Boxes<'a> {
+    min: *const f32,
+    max: *const f32,
+    stride: usize,
+    len: usize,
+    memory: PhantomData<&'a f32>,
+}
+
+impl<'a> Boxes<'a> {
+    /// # Safety
+    /// `min`, `n`, `stride` and `max` describe memory as the head of the header says, or can be told to be wrong.
+    pub(crate) unsafe fn new(min: *const f32, n: usize, stride: usize, max: *const f32) -> Result<Self, Failure> {
+        let least = if max.is_null() { size_of::<Aabb>() } else { size_of::<Corner>() };
+        let stride = if stride == 0 { least } else { stride };
+        if stride < least || !stride.is_multiple_of(align_of::<f32>()) {
+            let text = format!("the stride of boxes is {stride} bytes; use a multiple of 4, at least {least}, or 0");
+            return Err(Failure::new(SW_INVALID_ARGUMENT, text));
+        }
+        check(min, n, "boxes")?;
+        check(max, if max.is_null() { 0 } else { n }, "max")?;
+        if n.checked_mul(stride).is_none_or(|size| size > isize::MAX as usize) {
+            return Err(Failure::new(SW_TOO_MANY, format!("{n} boxes with a stride of {stride} bytes fit no memory")));
+        }
+        // The three floats behind the minimum, or nothing at all.
+        let max = if max.is_null() { min.wrapping_add(3) } else { max };
+        Ok(Self { min, max, stride, len: n, memory: PhantomData })
+    }
+
+    /// Returns the boxes where they are, if they lie as the library wants them.
+    pub(crate) fn as_slice(&self) -> Option<&'a [Aabb]> {
+        if self.len == 0 {
+            return Some(&[]);
+        }
+        let lies = self.stride == size_of::<Aabb>() && self.max == self.min.wrapping_add(3);
+        // SAFETY: there are `len` boxes, one right behind the other, as `new` was told.
+        lies.then(|| unsafe { std::slice::from_raw_parts(self.min.cast(), self.len) })
+    }
+
+    pub(crate) fn iter(&self) -> impl Iterator<Item = Aabb> + 'a {
+        let Self { min, max, stride, .. } = *self;
+        (0..self.len).map(move |k| {
+            // SAFETY: `new` was told that there are such floats, and that they are aligned.
+            let corner = |of: *const f32| unsafe { *of.byte_add(k * stride).cast::<Corner>() };
+            Aabb::new(corner(min), corner(max))
+        })
+    }
+
+    /// Returns the boxes as the library wants them, through a copy if they do not lie so.
+    pub(crate) fn to_slice<'b>(self, copy: &'b mut Vec<Aabb>) -> Result<&'b [Aabb], Failure>
+    where
+        'a: 'b,
+    {
+        if let Some(boxes) = self.as_slice() {
+            return Ok(boxes);
+        }
+        copy.clear();
+        copy.try_reserve(self.len).map_err(|_| Error::OutOfMemory { what: "boxes", elements: self.len })?;
+        copy.extend(self.iter());
+        Ok(copy)
+    }
+}
+
+/// Rounds a box of doubles outward: the floats contain every point between them. Far from the origin floats are
+/// coarse, 0.06 at a million: subtract an origin near the boxes first. SW_NULL.
+///
+/// cbindgen:ptrs-as-arrays=[[min; 3], [max; 3], [bounds; 6]]
+#[unsafe(no_mangle)]
+pub unsafe extern "C-unwind" fn sw_box_from_doubles(min: *const f64, max: *const f64, bounds: *mut f32) -> sw_status {
+    call(|| {
+        // SAFETY: of the caller.
+        unsafe {
+            let (min, max) = (slice(min, 3, "min")?, slice(max, 3, "max")?);
+            let corner = |of: &[f64]| [of[0], of[1], of[2]];
+            put(bounds.cast(), Aabb::from_f64(corner(min), corner(max)), "bounds")
+        }
+    })
+}
+
+/// Grows a box so that it contains the whole motion. Rounded outward. SW_NULL.
+///
+/// cbindgen:ptrs-as-arrays=[[bounds; 6], [motion; 3]]
+#[unsafe(no_mangle)]
+pub unsafe extern "C-unwind" fn sw_box_sweep(bounds: *mut f32, motion: *const f32) -> sw_status {
+    call(|| {
+        // SAFETY: of the caller.
+        unsafe {
+            let swept = one(bounds, "bounds")?.swept(corner(motion, "motion")?);
+            put(bounds.cast(), swept, "bounds")
+        }
+    })
+}
