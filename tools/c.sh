@@ -1,13 +1,14 @@
 #!/usr/bin/env bash
-# Builds the C library as its users do, installs it into a folder, and tests it there: with gcc and clang, under AddressSanitizer and valgrind, through CMake and Meson,
-# and beside Bullet.
+# Builds the C library as its users do, installs it into a folder, and tests it there: with gcc and clang, under
+# AddressSanitizer and valgrind, through CMake and Meson, and beside Bullet.
 #
 #   tools/c.sh             # formatting, clippy, tests of the border, and all of that
 #   tools/c.sh overhead    # instructions of a frame through C over those through Rust, at 100 and 100 000 boxes
 #   tools/c.sh bench       # 10 000 moving boxes beside btDbvtBroadphase, into results/c.csv
 #   tools/c.sh header      # writes bindings/c/include/sapwise.h
 #
-# Needs cargo-c; installs it where it is missing, and from Debian compilers, CMake, Meson and Bullet. Everything goes into target/c/.
+# Needs cargo-c, compilers, CMake, Meson and Bullet; on Debian it installs them if they are missing. Everything goes
+# into target/c/.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 what=${1:-test}
@@ -15,17 +16,19 @@ root=$PWD
 folder=${CARGO_TARGET_DIR:-$PWD/target}/c
 manifest=bindings/c/Cargo.toml
 examples=$root/bindings/c/examples
+bullet=(-std=c++17 -isystem /usr/include/bullet "$examples/bullet.cpp" -lBulletDynamics -lBulletCollision -lLinearMath)
 fail() { echo "c: $*" >&2; exit 1; }
 export CARGO_INCREMENTAL=0 CARGO_TARGET_DIR=$folder/build
 mkdir -p "$folder"
 
 has_bullet() { [ -e /usr/include/bullet/btBulletDynamicsCommon.h ]; }
-{ command -v clang && command -v cmake && command -v meson && command -v ninja && command -v pkg-config && has_bullet; } >/dev/null 2>&1 || {
+has_tools() { command -v clang && command -v cmake && command -v meson && command -v ninja && command -v pkg-config; }
+{ has_tools && has_bullet; } >/dev/null 2>&1 || {
     apt-get update -q
     apt-get install -qy --no-install-recommends clang cmake libbullet-dev meson ninja-build pkg-config
 }
 
-# The last version that this compiler builds. It contains cargo: minutes, once. Another folder keeps it from being built again.
+# The last version that this compiler builds. It contains cargo, which takes minutes, once.
 cargo_c() {
     command -v cargo-cinstall >/dev/null 2>&1 || {
         pkg-config --exists openssl || apt-get install -qy --no-install-recommends libssl-dev
@@ -44,7 +47,8 @@ installed() {
 compile() {
     local compiler=$1 profile=$2 out=$3
     shift 3
-    "$compiler" -O1 -g -Wall -Wextra -Wpedantic -Werror "-I$folder/$profile/include" "$@" "-L$folder/$profile/lib" -lsapwise "-Wl,-rpath,$folder/$profile/lib" -lm -o "$folder/$out"
+    "$compiler" -O1 -g -Wall -Wextra -Wpedantic -Werror "-I$folder/$profile/include" "$@" \
+        "-L$folder/$profile/lib" -lsapwise "-Wl,-rpath,$folder/$profile/lib" -lm -o "$folder/$out"
 }
 
 case $what in
@@ -66,8 +70,9 @@ test)
         c=${pair%:*} cpp=${pair#*:}
         compile "$c" dev pairs -std=c99 "${sanitize[@]}" "$examples/pairs.c"
         compile "$cpp" dev api -std=c++17 "${sanitize[@]}" bindings/c/tests/api.cpp
-        compile "$cpp" dev api-codes -std=c++17 "${sanitize[@]}" -fno-exceptions -DSAPWISE_NO_EXCEPTIONS bindings/c/tests/api.cpp
-        compile "$cpp" release bullet -std=c++17 "${sanitize[@]}" -isystem /usr/include/bullet "$examples/bullet.cpp" -lBulletDynamics -lBulletCollision -lLinearMath
+        compile "$cpp" dev api-codes -std=c++17 "${sanitize[@]}" -fno-exceptions -DSAPWISE_NO_EXCEPTIONS \
+            bindings/c/tests/api.cpp
+        compile "$cpp" release bullet "${sanitize[@]}" "${bullet[@]}"
         for program in pairs api api-codes bullet; do
             echo "c: $program by $c"
             "$folder/$program"
@@ -91,16 +96,21 @@ test)
     done
     for program in pairs pairs-static; do
         echo "c: $program under valgrind"
-        LD_LIBRARY_PATH=$folder/release/lib valgrind --quiet --leak-check=full --errors-for-leak-kinds=definite,indirect --error-exitcode=1 "$folder/meson/$program"
+        LD_LIBRARY_PATH=$folder/release/lib valgrind --quiet --leak-check=full \
+            --show-leak-kinds=definite,indirect --errors-for-leak-kinds=definite,indirect \
+            --error-exitcode=1 "$folder/meson/$program"
     done
     ;;
 overhead)
     installed release
-    cargo build --quiet --release --locked --manifest-path $manifest --example overhead
+    # With the name of the function to count.
+    CARGO_PROFILE_RELEASE_STRIP=false \
+        cargo build --quiet --release --locked --manifest-path $manifest --example overhead
     compile gcc release overhead -std=c99 bindings/c/benches/overhead.c
     # Instructions of the eight frames.
     count() {
-        valgrind --tool=callgrind "--callgrind-out-file=$folder/callgrind" --toggle-collect=measured_frame "$@" >"$folder/pairs" 2>/dev/null
+        valgrind --tool=callgrind "--callgrind-out-file=$folder/callgrind" --toggle-collect=measured_frame "$@" \
+            >"$folder/pairs" 2>/dev/null
         sed -n 's/^\(totals\|summary\): //p' "$folder/callgrind" | head -1
     }
     for n in 100 100000; do
@@ -113,11 +123,11 @@ overhead)
     ;;
 bench)
     installed release
-    compile g++ release bullet -O2 -std=c++17 -isystem /usr/include/bullet "$examples/bullet.cpp" -lBulletDynamics -lBulletCollision -lLinearMath
+    compile g++ release bullet -O2 "${bullet[@]}"
     "$folder/bullet" --bench >"$folder/bench.csv"
     machine="$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -1) ($(nproc) cores)"
-    sed "1s/^/machine,date,bullet,/; 2,\$s/^/$machine,$(date +%F),$(pkg-config --modversion bullet),/" "$folder/bench.csv" |
-        tee results/c.csv
+    known="$machine,$(date +%F),$(pkg-config --modversion bullet)"
+    sed "1s/^/machine,date,bullet,/; 2,\$s/^/$known,/" "$folder/bench.csv" | tee results/c.csv
     ;;
 *) fail "usage: tools/c.sh [test|overhead|bench|header]" ;;
 esac

@@ -60,7 +60,7 @@ pub unsafe extern "C-unwind" fn sw_search_new(options: *const sw_options) -> *mu
     })
 }
 
-/// Frees a search and its list of pairs, and waits for its threads. NULL is allowed. SW_BUSY if another thread uses it.
+/// Frees a search and its list of pairs. Otherwise as sw_space_free.
 #[unsafe(no_mangle)]
 pub unsafe extern "C-unwind" fn sw_search_free(search: *mut sw_search) -> sw_status {
     // SAFETY: of the caller.

@@ -77,8 +77,8 @@ pub unsafe extern "C-unwind" fn sw_space_new_with(options: *const sw_options) ->
     })
 }
 
-/// Frees a space, and waits for its threads. NULL is allowed. SW_BUSY, and nothing is freed, if a query of it runs:
-/// don't free it in a callback.
+/// Frees a space. Its threads end soon after: don't unload the library right away. NULL is allowed. SW_BUSY, and
+/// nothing is freed, if a query of it runs: don't free it in a callback.
 #[unsafe(no_mangle)]
 pub unsafe extern "C-unwind" fn sw_space_free(space: *mut sw_space) -> sw_status {
     // SAFETY: of the caller.
