@@ -235,7 +235,7 @@ sw_status sw_space_nearest(const sw_space *space,
 // SW_INVALID_ARGUMENT, SW_UNAVAILABLE or SW_PANIC.
 sw_search *sw_search_new(const sw_options *options);
 
-// Frees a search and its list of pairs, and waits for its threads. NULL is allowed. SW_BUSY if another thread uses it.
+// Frees a search and its list of pairs. Otherwise as sw_space_free.
 sw_status sw_search_free(sw_search *search);
 
 // Sets the most pairs, 8 bytes each, from the next call on. 0, the default: no limit. A call that would find more is
@@ -296,8 +296,8 @@ sw_space *sw_space_new_measured(const char *cache_folder);
 // SW_PANIC. A cache that can't be read is no failure: sw_space_describe reports it.
 sw_space *sw_space_new_with(const sw_options *options);
 
-// Frees a space, and waits for its threads. NULL is allowed. SW_BUSY, and nothing is freed, if a query of it runs:
-// don't free it in a callback.
+// Frees a space. Its threads end soon after: don't unload the library right away. NULL is allowed. SW_BUSY, and
+// nothing is freed, if a query of it runs: don't free it in a callback.
 sw_status sw_space_free(sw_space *space);
 
 // Makes a copy that continues as the original would: the same calls give the same lists. It has its own threads, and
