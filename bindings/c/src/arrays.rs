@@ -54,9 +54,9 @@ pub(crate) fn handle(bits: u64) -> Result<Handle, Failure> {
 pub(crate) unsafe fn handles<'a>(first: *const u64, n: usize) -> Result<&'a [Handle], Failure> {
     // SAFETY: of the caller.
     let bits = unsafe { slice(first, n, "handles") }?;
-    // Without a branch for each, so that several are looked at together.
-    let zeros: u64 = bits.iter().map(|&bits| u64::from(bits == 0)).sum();
-    if zeros > 0 {
+    // A generation is not 0. Without a branch for each, so that several are looked at together.
+    let suspicious = bits.iter().fold(false, |any, &bits| any | (bits as u32 == 0));
+    if suspicious && bits.contains(&0) {
         handle(0)?;
     }
     // SAFETY: a handle is a `NonZeroU64` without more, and none of the numbers is 0.
