@@ -6,28 +6,26 @@ from pathlib import Path
 
 import sapwise
 
-#: The heads of the two columns.
-HEAD = "| name | what it does |\n|---|---|\n"
+#: The heads of the columns.
+HEAD = "| name | what it does | members |\n|---|---|---|\n"
 
 
 def first(of):
-    """The first paragraph of a docstring, as Markdown."""
-    return inspect.getdoc(of).split("\n\n")[0].replace("\n", " ").replace("``", "`")
+    """The first sentence of a docstring, as Markdown."""
+    return inspect.getdoc(of).split("\n\n")[0].replace("\n", " ").replace("``", "`").split(". ")[0].rstrip(".")
 
 
 def index():
     """The table: what is public, exceptions aside, which have a table of their own, and the members of the classes that do something."""
-    rows = {}
+    rows = []
     for name in sapwise.__all__:
         of = getattr(sapwise, name)
-        if name != "__version__" and not (inspect.isclass(of) and issubclass(of, BaseException)):
-            rows[name] = of
-    for name in ("BroadPhase", "Tuning"):
-        of = getattr(sapwise, name)
-        # What the attributes of a tuning are stands in its own docstring.
-        members = (m for m in sorted(vars(of)) if not m.startswith("_") and getattr(of, m).__doc__)
-        rows |= {f"{name}.{member}": getattr(of, member) for member in members}
-    return HEAD + "".join(f"| `{name}` | {first(of)} |\n" for name, of in rows.items())
+        if name == "__version__" or inspect.isclass(of) and issubclass(of, BaseException):
+            continue
+        # What the attributes of a decision and a tuning are stands in their own docstrings.
+        members = sorted(m for m in vars(of) if not m.startswith("_") and getattr(of, m).__doc__) if inspect.isclass(of) else []
+        rows.append(f"| `{name}` | {first(of)} | {', '.join(f'`{m}`' for m in members)} |\n")
+    return HEAD + "".join(rows)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 
-from ._errors import ConversionWarning, InputError
+from ._errors import ConversionWarning, InputError, RoundingWarning
 
 #: The most boxes that 32 bits can name.
 _MOST = 2**32 - 1
@@ -12,18 +12,34 @@ _MOST = 2**32 - 1
 _WORTH_A_WARNING = 10_000
 #: Integers up to this are exact as 64-bit floats.
 _EXACT = 2**53
-_SHAPE = "give shape (n, 6), minx miny minz maxx maxy maxz a row, or lower and upper corners of shape (n, 3) each"
+_SHAPE = (
+    "give shape (n, 6), minx miny minz maxx maxy maxz a row, or lower and upper corners of shape (n, 3) each; "
+    "in two dimensions (n, 4), or (n, 2) each"
+)
+#: What a keyword of a filter holds where it is not given.
+_DEFAULTS = {"groups": 0xFFFFFFFF, "masks": 0xFFFFFFFF, "owner": 0, "fixed": False}
 
-_has_warned = False
+_has_warned: set[type] = set()
 
 
-def _warn(count, why):
-    global _has_warned
-    if count < _WORTH_A_WARNING or _has_warned:
-        return
-    _has_warned = True
-    text = f"{count} boxes were copied: {why}. C-contiguous float32 of shape (n, 6) is read in place. Warned once."
-    warnings.warn(text, ConversionWarning, stacklevel=3)
+def _warn(kind, text):
+    if kind not in _has_warned:
+        _has_warned.add(kind)
+        warnings.warn(f"{text} Warned once.", kind, stacklevel=3)
+
+
+def _warn_of_copy(count, why):
+    if count >= _WORTH_A_WARNING:
+        text = f"{count} boxes were copied: {why}. C-contiguous float32 of shape (n, 6) is read in place."
+        _warn(ConversionWarning, text)
+
+
+def warn_of_rounding():
+    text = (
+        "boxes were rounded outward to 32-bit floats, which may add pairs of boxes that nearly touch. Subtract an "
+        "origin near the boxes, give float32, or use pairs, which drops such pairs."
+    )
+    _warn(RoundingWarning, text)
 
 
 def _array(given, name):
@@ -57,7 +73,7 @@ def _floats(array, name, which):
     if array.dtype.newbyteorder("=") != np.dtype(wanted) or not array.dtype.isnative:
         why = f"their dtype is {array.dtype.str}"
     elif wanted is np.float64:
-        why = "they are 64-bit floats, which are rounded to 32 bits"
+        why = "they are 64-bit floats, which are rounded outward to 32 bits"
     elif not (array.flags.c_contiguous and array.flags.aligned):
         why = "they are not C-contiguous" if array.flags.aligned else "they are not aligned"
     else:
@@ -65,46 +81,92 @@ def _floats(array, name, which):
     return np.require(array, dtype=wanted, requirements=["C", "A"]), why
 
 
+def _flat(array, name, which):
+    """Return floats of shape (n, 6), and why they were copied if that could be helped."""
+    _check_count(len(array))
+    floats, why = _floats(array, name, which)
+    if array.ndim == 3:
+        floats = floats.reshape(len(array), 2 * array.shape[2])
+    if floats.shape[1] == 4:
+        flat = np.zeros((len(floats), 6), floats.dtype)
+        flat[:, 0:2], flat[:, 3:5] = floats[:, :2], floats[:, 2:]
+        return flat, None
+    return floats, why
+
+
 def boxes(given, upper, which):
-    """Return one array of shape (n, 6), or a tuple of two of shape (n, 3), all float32 or all float64."""
+    """Return C-contiguous float32 or float64 of shape (n, 6)."""
     name = f"the list{which}" if which else "boxes"
     if upper is None:
         array = _array(given, name)
         if array.shape == (0,):
             return np.empty((0, 6), np.float32)
-        if array.ndim == 3 and array.shape[1:] == (2, 3):
-            flat = True
-        elif array.ndim == 2 and array.shape[1] == 6:
-            flat = False
-        else:
+        if array.shape[1:] not in ((6,), (2, 3), (4,), (2, 2)):
             hint = ""
             if array.ndim == 2 and array.shape[1] == 3:
                 hint = "these are lower corners alone; "
             elif array.ndim == 2 and array.shape[0] == 6:
                 hint = "these are columns, transpose them; "
             raise InputError(f"{name} has shape {array.shape}: {hint}{_SHAPE}")
-        _check_count(len(array))
-        floats, why = _floats(array, name, which)
+        floats, why = _flat(array, name, which)
         if why:
-            _warn(len(array), why)
-        return floats.reshape(-1, 6) if flat else floats
-    corners = [_array(given, "boxes (the lower corners)"), _array(upper, "upper")]
+            _warn_of_copy(len(array), why)
+        return floats
+    names = ("boxes (the lower corners)", "upper")
+    corners = [_array(of, name) for of, name in zip((given, upper), names)]
     if any(c.shape == (0,) for c in corners) and all(c.size == 0 for c in corners):
         return np.empty((0, 6), np.float32)
-    for corner, name in zip(corners, ("boxes (the lower corners)", "upper")):
-        if corner.ndim != 2 or corner.shape[1] != 3:
+    for corner, name in zip(corners, names):
+        if corner.ndim != 2 or corner.shape[1] not in (2, 3):
             raise InputError(f"{name} has shape {corner.shape}: {_SHAPE}")
     lower, upper = corners
     if len(lower) != len(upper):
         raise InputError(f"there are {len(lower)} lower and {len(upper)} upper corners; give one of each for each box")
+    if lower.shape != upper.shape:
+        raise InputError(f"the lower corners have {lower.shape[1]} axes and the upper ones {upper.shape[1]}: {_SHAPE}")
     _check_count(len(lower))
-    lower, why_lower = _floats(lower, "boxes (the lower corners)", which)
-    upper, why_upper = _floats(upper, "upper", which)
+    (lower, why_lower), (upper, why_upper) = (_floats(of, name, which) for of, name in zip(corners, names))
     if why_lower or why_upper:
-        _warn(len(lower), why_lower or why_upper)
-    if lower.dtype != upper.dtype:
-        lower, upper = lower.astype(np.float64, copy=False), upper.astype(np.float64, copy=False)
-    return lower, upper
+        _warn_of_copy(len(lower), why_lower or why_upper)
+    return _flat(np.concatenate((lower, upper), axis=1), "boxes", which)[0]
+
+
+def box_or_boxes(given):
+    """Return what `boxes` does, for a single box too."""
+    array = _array(given, "boxes")
+    return boxes(array[None] if array.shape in ((6,), (4,)) else array, None, "")
+
+
+def points(given, name, of_one):
+    """Return float32 of shape (n, 3), rounded to nearest: of one point if `of_one`, which has shape (3,) or (2,)."""
+    array = _array(given, name)
+    wanted = "(3,)" if of_one else "(n, 3)"
+    if of_one:
+        array = array[None]
+    elif array.shape == (0,):
+        array = np.empty((0, 3), np.float32)
+    if array.ndim != 2 or array.shape[1] not in (2, 3):
+        shape = array.shape[1:] if of_one else array.shape
+        raise InputError(f"{name} has shape {shape}; give {wanted}, or {wanted.replace('3', '2')} in two dimensions")
+    if array.dtype.kind not in "fiu":
+        raise TypeError(f"{name} has dtype {array.dtype}; give numbers")
+    flat = np.zeros((len(array), 3), np.float32)
+    with np.errstate(over="ignore", invalid="ignore"):
+        flat[:, : array.shape[1]] = array
+    return flat
+
+
+def rays(origins, directions, most, of_one):
+    """Return origins, directions and maxima as float32, one of each for each ray."""
+    name = ("origin", "direction") if of_one else ("origins", "directions")
+    origins, directions = points(origins, name[0], of_one), points(directions, name[1], of_one)
+    if len(origins) != len(directions):
+        raise InputError(f"there are {len(origins)} origins and {len(directions)} directions; give one for each ray")
+    most = _array(np.inf if most is None else most, "max")
+    if most.dtype.kind not in "fiu" or most.shape not in ((), (len(origins),)):
+        raise InputError(f"max has shape {most.shape} and dtype {most.dtype}; give one number, or one for each ray")
+    with np.errstate(over="ignore"):
+        return origins, directions, np.ascontiguousarray(np.broadcast_to(most, len(origins)), np.float32)
 
 
 def _check_count(count):
@@ -112,15 +174,19 @@ def _check_count(count):
         raise InputError(f"{count} boxes are more than the {_MOST} that 32 bits can number; split the scene")
 
 
-def _whole(given, name, count):
-    """Return an array of whole numbers, of any length if `count` is None."""
+def _check_length(array, name, count):
+    if count is not None and array.ndim == 1 and len(array) != count:
+        raise InputError(f"{name} has {len(array)} entries and there are {count} boxes; give one for each box")
+
+
+def _whole(given, name, count, or_one=False):
+    """Return an array of whole numbers, of any length if `count` is None; a single one only if `or_one`."""
     array = _array(given, name)
     if array.shape == (0,):
         array = array.astype(np.int64)
-    if array.ndim != 1 or array.dtype.kind not in "iu":
+    if array.ndim > 1 or array.ndim == 0 and not or_one or array.dtype.kind not in "iu":
         raise InputError(f"{name} has shape {array.shape} and dtype {array.dtype}; give one whole number for each box")
-    if count is not None and len(array) != count:
-        raise InputError(f"{name} has {len(array)} entries and there are {count} boxes; give one for each box")
+    _check_length(array, name, count)
     return array
 
 
@@ -134,30 +200,59 @@ def ids(given, count):
     return np.ascontiguousarray(array, np.int64)
 
 
-def _bits(given, name, count):
-    """Return 32 bits for each box."""
+def handles(given):
+    """Return handles as uint64."""
+    array = np.atleast_1d(_whole(given, "handles", None, True))
+    if array.dtype.kind == "i" and array.size and array.min() < 0:
+        index = int(np.argmax(array < 0))
+        raise InputError(f"the handle at position {index} is {array[index]}; give what insert has returned")
+    return np.ascontiguousarray(array, np.uint64)
+
+
+def _joined(given, name, counts, column):
+    """Return the column of one list, or the columns of two lists one after the other."""
+    if not isinstance(counts, tuple):
+        return column(given, name, counts)
+    if not isinstance(given, (tuple, list)) or len(given) != 2:
+        raise InputError(f"{name} is for two lists here; give a pair, ({name} of a, {name} of b)")
+    ends = (f"{name} of a", f"{name} of b")
+    return np.concatenate([column(of, end, count) for of, end, count in zip(given, ends, counts)])
+
+
+def _column(given, name, count):
+    """Return the entries of a keyword of a filter: one for each box, or one for all, or None for the default."""
+    keyword = name.split()[0]
     if given is None:
-        return np.full(count, 0xFFFFFFFF, np.uint32)
-    array = _whole(given, name, count)
-    outside = (array < 0) | (array > 0xFFFFFFFF)
-    if outside.any():
-        index = int(np.argmax(outside))
-        raise InputError(f"{name} of box {index} is {array[index]}; give 32 bits, 0 to 4294967295")
-    return np.ascontiguousarray(array, np.uint32)
+        given = _DEFAULTS[keyword]
+    if keyword != "fixed":
+        array = _whole(given, name, count, True)
+        outside = (array < 0) | (array > 0xFFFFFFFF)
+        if outside.any():
+            index = int(np.argmax(outside))
+            raise InputError(f"{name} of box {index} is {array.flat[index]}; give 32 bits, 0 to 4294967295")
+        array = array.astype(np.uint32, copy=False)
+    else:
+        array = _array(given, name)
+        array = array.astype(bool) if array.shape == (0,) else array
+        if array.ndim > 1 or array.dtype.kind != "b":
+            raise InputError(
+                f"{name} has shape {array.shape} and dtype {array.dtype}; give True or False for each box"
+            )
+        _check_length(array, name, count)
+    return np.ascontiguousarray(np.broadcast_to(array, array.shape if count is None else (count,)))
 
 
-def memberships(groups, masks, fixed):
-    """Return groups, masks and fixed, each with one entry a box."""
-    if fixed is not None:
-        fixed = _array(fixed, "fixed")
-        if fixed.shape == (0,):
-            fixed = fixed.astype(bool)
-        if fixed.ndim != 1 or fixed.dtype.kind != "b":
-            raise InputError(f"fixed has shape {fixed.shape} and dtype {fixed.dtype}; give True or False for each box")
-    given = next(of for of in (groups, masks, fixed) if of is not None)
-    count = len(np.atleast_1d(_array(given, "groups, masks or fixed")))
-    if fixed is None:
-        fixed = np.zeros(count, bool)
-    elif len(fixed) != count:
-        raise InputError(f"fixed has {len(fixed)} entries and groups or masks {count}; give one for each box")
-    return _bits(groups, "groups", count), _bits(masks, "masks", count), np.ascontiguousarray(fixed)
+def memberships(counts, groups, masks, owner, fixed):
+    """Return groups, masks, owner and fixed: None, or an array with one entry for each box."""
+    given = {"groups": groups, "masks": masks, "owner": owner, "fixed": fixed}
+    if counts is None:
+        counts = next((len(of) for of in given.values() if np.ndim(of) > 0), None)
+        if counts is None:
+            raise InputError("each keyword has a single number; give one of them an entry for each box")
+    return tuple(None if of is None else _joined(of, name, counts, _column) for name, of in given.items())
+
+
+def worlds(given, counts):
+    """Return the world of each box as int64."""
+    of = lambda given, name, count: np.ascontiguousarray(_whole(given, name, count), np.int64)
+    return np.ascontiguousarray(_joined(given, "worlds", counts, of))

@@ -10,7 +10,8 @@ use sapwise::algorithm::Load;
 /// Attributes
 /// ----------
 /// algorithm : str
-///     The algorithm that ran, for instance ``"grid-sap@cpu2"``: the method and its most threads.
+///     The algorithm that ran, for instance ``"grid-sap@cpu2"``: the method and its most threads. ``"between"`` or
+///     ``"worlds"`` for the searches that have one algorithm.
 /// reason : str
 ///     The reason, in words.
 /// source : str
@@ -26,6 +27,7 @@ use sapwise::algorithm::Load;
 ///     The estimated load of the frame: ``objects``, ``axis_candidates``, ``strip_candidates``, ``pairs``, ``moved``,
 ///     ``moved_share``.
 #[pyclass(frozen, name = "Decision", module = "sapwise")]
+#[derive(Clone)]
 pub(crate) struct PyDecision {
     #[pyo3(get)]
     algorithm: String,
@@ -54,6 +56,23 @@ impl From<Decision<'_>> for PyDecision {
             runner_up: decision.runner_up.map(|(id, ns)| (id.to_string(), ns)),
             load: decision.load,
             sentence: decision.to_string(),
+        }
+    }
+}
+
+impl PyDecision {
+    /// Makes the decision of a search that has one algorithm.
+    pub(crate) fn alone(algorithm: &str, reason: &str, load: Load) -> Self {
+        let Load { objects, pairs, .. } = load;
+        Self {
+            algorithm: algorithm.to_owned(),
+            reason: reason.to_owned(),
+            source: "default".to_owned(),
+            expected_ns: None,
+            measured_ns: None,
+            runner_up: None,
+            load,
+            sentence: format!("{algorithm}, {reason}; {objects} boxes, {pairs} pairs"),
         }
     }
 }

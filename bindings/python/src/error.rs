@@ -1,9 +1,8 @@
 //! Converts Rust errors to Python exceptions of `sapwise._errors`.
 
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
 use sapwise::Error;
-use sapwise::error::BoxDefect;
+use sapwise::error::{BoxDefect, RayDefect, Unavailable};
 
 /// Makes an instance of a class of `sapwise._errors`.
 fn instance<'py>(py: Python<'py>, class: &str, arguments: impl pyo3::call::PyCallArgs<'py>) -> PyErr {
@@ -26,6 +25,20 @@ pub(crate) fn invalid_box(py: Python<'_>, which: &str, index: usize, defect: Box
     instance(py, "InvalidBoxError", (format!("box {index}{which} {defect}; correct it or leave it out"), index))
 }
 
+/// Makes the exception for an invalid ray, motion or point. `what` says which.
+pub(crate) fn invalid_ray(py: Python<'_>, what: &str, index: usize, defect: RayDefect) -> PyErr {
+    instance(py, "InvalidRayError", (format!("{what} {index} {defect}; correct it or leave it out"), index))
+}
+
+/// Makes the exception for a handle that names no body.
+pub(crate) fn stale(py: Python<'_>, index: usize, bits: u64) -> PyErr {
+    let text = format!(
+        "handle {bits} at position {index} names no body of this space: it was removed, or is of another space; \
+         `handle in space` tells"
+    );
+    instance(py, "StaleHandleError", (text, index))
+}
+
 /// Makes the exception for an error of a frame of the boxes `which`.
 pub(crate) fn exception(py: Python<'_>, error: &Error, which: &str) -> PyErr {
     match *error {
@@ -36,12 +49,21 @@ pub(crate) fn exception(py: Python<'_>, error: &Error, which: &str) -> PyErr {
         Error::TooManyPairs { limit } => {
             let text = format!(
                 "more pairs overlap than the limit of {limit}; raise it with `limit=`, at about 30 bytes of memory a \
-                 pair, \
-                 or thin out the scene"
+                 pair, or thin out the scene"
             );
             instance(py, "TooManyPairsError", (text, limit))
         }
-        Error::OutOfMemory { .. } => pyo3::exceptions::PyMemoryError::new_err(error.to_string()),
+        Error::Unavailable { ref algorithm, reason: Unavailable::TooFewCores { threads, most } } => failed(
+            py,
+            format!(
+                "{algorithm} needs {threads} threads, and {most} may be used; raise `threads=` up to the cores of \
+                 this machine, or name an algorithm with fewer"
+            ),
+        ),
+        Error::OutOfMemory { what, elements } => pyo3::exceptions::PyMemoryError::new_err(format!(
+            "no memory for {elements} {what}; bound the pairs with `limit=`, or give fewer boxes"
+        )),
+        Error::NoAlgorithm => failed(py, "the tuning names no algorithm; make one with `sapwise.predict()`"),
         _ => failed(py, error.to_string()),
     }
 }
@@ -59,9 +81,4 @@ pub(crate) fn call<'py>(
     arguments: impl pyo3::call::PyCallArgs<'py>,
 ) -> PyResult<Bound<'py, PyAny>> {
     py.import(module)?.getattr(function)?.call1(arguments)
-}
-
-/// Returns both elements of a tuple.
-pub(crate) fn two<'py>(of: &Bound<'py, PyTuple>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-    Ok((of.get_item(0)?, of.get_item(1)?))
 }

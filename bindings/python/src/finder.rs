@@ -2,9 +2,11 @@
 
 use crate::boxes::boxes;
 use crate::decision::PyDecision;
-use crate::error::{call, exception, failed, unusable, with_cause};
-use crate::frame::{Flat, Frames, Ids, Shared, State, locked};
-use crate::one_shot::two_columns;
+use crate::engine::two_columns;
+use crate::error::{call, exception, unusable};
+use crate::filter::Keywords;
+use crate::frame::{Flat, Frames, Ids};
+use crate::held::Held;
 use crate::start::{self, Start};
 use crate::tuning::PyTuning;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
@@ -67,42 +69,18 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// 1 0 0
 #[pyclass(frozen, name = "BroadPhase", module = "sapwise")]
 pub(crate) struct PyBroadPhase {
-    start: Start,
-    state: Mutex<State>,
+    frames: Held<Frames>,
+    /// Locked only by a thread with the interpreter's lock, and for an instant.
+    filter: Mutex<Option<Arc<Vec<Membership>>>>,
 }
 
 impl PyBroadPhase {
-    fn state(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Returns the frames, made anew after a fork, and the filter.
-    fn shared(&self, py: Python<'_>) -> PyResult<(Shared, Option<Arc<Vec<Membership>>>)> {
-        let pid = std::process::id();
-        let state = self.state();
-        let Some(frames) = &state.frames else {
-            return Err(failed(py, "this BroadPhase is closed; make another one"));
-        };
-        if state.pid == pid {
-            return Ok((Arc::clone(frames), state.filter.clone()));
-        }
-        // After a fork this process has one thread.
-        drop(state);
-        let made = Arc::new(Mutex::new(Frames::new(start::adaptive(py, &self.start)?, &self.start)));
-        let mut state = self.state();
-        std::mem::forget(state.frames.replace(Arc::clone(&made)));
-        state.pid = pid;
-        Ok((made, state.filter.clone()))
-    }
-
-    /// Runs `what` on the frames, without the interpreter's lock.
-    fn with<T: Send>(&self, py: Python<'_>, what: impl FnOnce(&mut Frames) -> T + Send) -> PyResult<T> {
-        let (frames, _) = self.shared(py)?;
-        Ok(py.detach(|| what(&mut locked(&frames))))
+    fn filter(&self) -> MutexGuard<'_, Option<Arc<Vec<Membership>>>> {
+        self.filter.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn changed<'py>(&self, py: Python<'py>, begun: bool) -> PyResult<Bound<'py, PyAny>> {
-        let found = self.with(py, |frames| frames.changed(begun))?;
+        let found = self.frames.write(py, |frames| frames.changed(begun))?;
         Ok(match found.map_err(|error| exception(py, &error, ""))? {
             Flat::Positions(numbers) => two_columns(py, numbers)?.into_any(),
             Flat::Given(ids) => two_columns(py, ids)?.into_any(),
@@ -125,41 +103,24 @@ impl PyBroadPhase {
         background: bool,
         tuning: Option<&PyTuning>,
         algorithm: Option<String>,
-        threads: Option<u32>,
+        #[pyo3(from_py_with = start::threads)] threads: Option<u32>,
         learning: bool,
         exploring: bool,
         ordered: bool,
-        limit: Option<usize>,
+        #[pyo3(from_py_with = start::limit)] limit: Option<usize>,
     ) -> PyResult<Self> {
-        if threads == Some(0) {
-            return Err(unusable(py, "threads is 0; give 1 or more, or None for all usable cores"));
-        }
-        if algorithm.is_some() && tuning.is_some() {
-            return Err(unusable(py, "algorithm and tuning exclude each other; give one of them"));
-        }
-        let mut options = start::options(cache)?.background(background);
-        if !measure {
-            options = options.measure(None);
-        }
-        let no_cache = matches!(cache.map(|c| c.extract::<bool>()), Some(Ok(false)));
-        let keeps = algorithm.is_none() && tuning.is_none() && !no_cache;
-        let tuning = tuning.map(|t| t.tuning.clone());
-        let order = start::order(ordered);
-        let start = Start { options, keeps, learning, exploring, threads, algorithm, tuning, order, limit };
-        let frames = Frames::new(start::adaptive(py, &start)?, &start);
-        let frames = Some(Arc::new(Mutex::new(frames)));
-        Ok(Self { start, state: Mutex::new(State { pid: std::process::id(), frames, filter: None }) })
+        let start = Start { ordered, limit, ..Start::new(cache, measure, background, tuning, algorithm)? };
+        let start = Start { learning, exploring, threads, ..start };
+        let frames = Held::new(py, start, Frames::new)?;
+        Ok(Self { frames, filter: Mutex::new(None) })
     }
 
     /// Find the pairs of the next frame.
     ///
     /// Parameters
     /// ----------
-    /// boxes : array_like, shape (n, 6) or (n, 2, 3)
-    ///     One box a row: minx, miny, minz, maxx, maxy, maxz, in any unit of length. With ``upper``: the lower corners,
-    ///     shape (n, 3).
-    /// upper : array_like, shape (n, 3), optional
-    ///     The upper corners.
+    /// boxes, upper : array_like
+    ///     As in ``pairs``. 64-bit floats and integers are rounded outward: nearly touching boxes may be a pair.
     /// ids : array_like of int, shape (n,), optional
     ///     An id for each box, if boxes change their positions: ``begun`` and ``ended`` then hold ids. Boxes with the
     ///     same id count as one there. Give ids in each frame or in none.
@@ -194,6 +155,7 @@ impl PyBroadPhase {
     ) -> PyResult<Bound<'py, PyArray2<u32>>> {
         let py = boxes.py();
         let given = self::boxes(boxes, upper, "")?;
+        given.warn_if_rounded(py)?;
         let boxes = given.as_slice()?;
         let ids = match ids {
             None => Ids::Positions,
@@ -203,7 +165,7 @@ impl PyBroadPhase {
             }
         };
         py.check_signals()?;
-        let (frames, filter) = self.shared(py)?;
+        let filter = self.filter().clone();
         if let Some(filter) = filter.as_ref().filter(|f| f.len() != boxes.len()) {
             let text = format!(
                 "the filter is for {} boxes and there are {}; call set_filter with one entry a box, \
@@ -213,13 +175,12 @@ impl PyBroadPhase {
             );
             return Err(unusable(py, text));
         }
-        let found = py.detach(|| {
-            let mut frames = locked(&frames);
+        let found = self.frames.write(py, |frames| {
             if frames.has_other_ids(&ids) {
                 return None;
             }
             Some(frames.find(boxes, ids, filter.as_ref()))
-        });
+        })?;
         py.check_signals()?;
         match found {
             None => Err(unusable(
@@ -233,41 +194,30 @@ impl PyBroadPhase {
 
     /// Set which boxes may be a pair, from the next frame on. Without arguments every two may.
     ///
-    /// Two boxes are a pair only if each has a group that is in the mask of the other, and if not both are fixed.
-    ///
     /// Parameters
     /// ----------
-    /// groups, masks : array_like of int, shape (n,), optional
-    ///     One bit a group, 32 bits. By default a box is in every group, and its mask allows every group.
-    /// fixed : array_like of bool, shape (n,), optional
-    ///     Which boxes never move. Two fixed boxes are no pair.
+    /// groups, masks, owner : array_like of int, optional
+    /// fixed : array_like of bool, optional
+    ///     As in ``pairs``.
     ///
     /// Raises
     /// ------
     /// InputError
     ///     The lengths differ, or a number does not fit into 32 bits. ``find`` raises it if it gets more or fewer
     ///     boxes.
-    #[pyo3(signature = (*, groups=None, masks=None, fixed=None))]
+    #[pyo3(signature = (*, groups=None, masks=None, owner=None, fixed=None))]
     fn set_filter(
         &self,
         py: Python<'_>,
         groups: Option<&Bound<'_, PyAny>>,
         masks: Option<&Bound<'_, PyAny>>,
+        owner: Option<&Bound<'_, PyAny>>,
         fixed: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let filter = if groups.is_none() && masks.is_none() && fixed.is_none() {
-            None
-        } else {
-            type Columns<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<bool>>);
-            let columns = call(py, "sapwise._arrays", "memberships", (groups, masks, fixed))?;
-            let (groups, masks, fixed): Columns<'_> = columns.extract()?;
-            let (groups, masks, fixed) = (groups.to_vec()?, masks.to_vec()?, fixed.to_vec()?);
-            let each = groups.into_iter().zip(masks).zip(fixed);
-            Some(Arc::new(each.map(|((groups, mask), fixed)| Membership { groups, mask, fixed, owner: 0 }).collect()))
-        };
+        let filter = Keywords { groups, masks, owner, fixed }.memberships(py, None::<usize>)?;
         // Raises if it is closed.
-        self.shared(py)?;
-        self.state().filter = filter;
+        self.frames.shared(py)?;
+        *self.filter() = filter.map(Arc::new);
         Ok(())
     }
 
@@ -287,21 +237,20 @@ impl PyBroadPhase {
     /// Decision or None: what was decided for the last frame, and why; None before the first.
     #[getter]
     fn last_decision(&self, py: Python<'_>) -> PyResult<Option<PyDecision>> {
-        self.with(py, |frames| frames.adaptive.last_decision().map(PyDecision::from))
+        self.frames.last_decision(py)
     }
 
     /// Tuning: the expected cost of each algorithm, corrected by what was learned.
     #[getter]
     fn tuning(&self, py: Python<'_>) -> PyResult<PyTuning> {
-        self.with(py, |frames| PyTuning::from(frames.adaptive.learned()))
+        self.frames.tuning(py)
     }
 
     /// dict: where the tuning came from (``origin``), ``remarks`` on what went wrong, ``seconds``, the ``file`` of
     /// the cache.
     #[getter]
     fn setup<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let setup = self.with(py, |frames| frames.adaptive.setup().clone())?;
-        crate::tuning::setup(py, &setup)
+        self.frames.setup(py)
     }
 
     /// Keep what was learned for the next start on this machine.
@@ -316,31 +265,18 @@ impl PyBroadPhase {
     /// SapwiseError
     ///     There is no cache, or it can't be written.
     fn save(&self, py: Python<'_>) -> PyResult<bool> {
-        let saved = self.with(py, |frames| frames.adaptive.save())?;
-        let saved = saved.map_err(|error| failed(py, with_cause(&error)))?;
-        if saved {
-            crate::one_shot::start_again(py);
-        }
-        Ok(saved)
+        self.frames.save(py)
     }
 
     /// End its threads and free its memory. It can't be used afterwards. Closing it twice does nothing.
     fn close(&self, py: Python<'_>) {
-        let (frames, foreign) = {
-            let mut state = self.state();
-            (state.frames.take(), state.pid != std::process::id())
-        };
-        if foreign {
-            std::mem::forget(frames);
-        } else {
-            py.detach(|| drop(frames));
-        }
+        self.frames.close(py);
     }
 
     /// bool: whether it was closed.
     #[getter]
     fn closed(&self) -> bool {
-        self.state().frames.is_none()
+        self.frames.is_closed()
     }
 
     fn __enter__(this: PyRef<'_, Self>) -> PyRef<'_, Self> {
@@ -356,25 +292,10 @@ impl PyBroadPhase {
         trace: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<bool> {
         let _ = (kind, value, trace);
-        if !self.closed() {
-            let saved = if self.start.keeps { self.save(py).err() } else { None };
-            self.close(py);
-            if let Some(why) = saved {
-                // What the block raised matters more than a cache that can't be written.
-                call(py, "sapwise._errors", "warn_unsaved", (why.value(py).to_string(),))?;
-            }
-        }
-        Ok(false)
+        self.frames.exit(py)
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        if self.closed() {
-            return Ok("<sapwise.BroadPhase, closed>".to_owned());
-        }
-        let last = self.last_decision(py)?;
-        Ok(last.map_or_else(
-            || "<sapwise.BroadPhase, no frame yet>".to_owned(),
-            |decision| format!("<sapwise.BroadPhase: {}>", decision.sentence),
-        ))
+        self.frames.text(py, "no frame yet")
     }
 }

@@ -1,9 +1,10 @@
 //! The frames of a `BroadPhase`.
 
-use crate::one_shot::flat;
+use crate::engine::flat;
+use crate::held::Searcher;
 use crate::start::Start;
 use sapwise::{Aabb, Adaptive, BroadPhase, Changes, Error, Filter, Membership, Pairs};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, RwLock};
 
 /// The ids of the boxes of a frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -34,7 +35,7 @@ pub(crate) enum Flat {
 
 /// The broad phase, its last two frames, and the changes between them.
 pub(crate) struct Frames {
-    pub(crate) adaptive: Adaptive,
+    adaptive: Adaptive,
     frames: [Frame; 2],
     /// The position in `frames` of the last frame that succeeded.
     now: usize,
@@ -47,6 +48,18 @@ pub(crate) struct Frames {
     failed: bool,
     /// The filter of the lists.
     filter: Option<Arc<Vec<Membership>>>,
+}
+
+impl Searcher for Frames {
+    const CLASS: &'static str = "BroadPhase";
+
+    fn forked(_: &RwLock<Self>, adaptive: Adaptive, start: &Start) -> Result<Self, String> {
+        Ok(Self::new(adaptive, start))
+    }
+
+    fn adaptive(&self) -> &Adaptive {
+        &self.adaptive
+    }
 }
 
 impl Frames {
@@ -145,30 +158,4 @@ impl Frames {
 fn numbers<Id: Copy + Ord>(changes: &Changes<Id>, begun: bool) -> Vec<Id> {
     let pairs = if begun { changes.begun() } else { changes.ended() };
     pairs.iter().flat_map(|&(a, b)| [a, b]).collect()
-}
-
-/// Frames behind a lock, which only a thread without the interpreter's lock takes.
-pub(crate) type Shared = Arc<Mutex<Frames>>;
-
-/// Locked only by a thread with the interpreter's lock, and for an instant: no fork finds it locked.
-pub(crate) struct State {
-    /// The process that made the frames. Their threads are not in a forked one.
-    pub(crate) pid: u32,
-    /// `None` once it is closed.
-    pub(crate) frames: Option<Shared>,
-    pub(crate) filter: Option<Arc<Vec<Membership>>>,
-}
-
-impl Drop for State {
-    fn drop(&mut self) {
-        if self.pid != std::process::id() {
-            // Dropping them would wait for threads that are not in this process.
-            std::mem::forget(self.frames.take());
-        }
-    }
-}
-
-/// Locks the frames once no other call uses them.
-pub(crate) fn locked(frames: &Shared) -> MutexGuard<'_, Frames> {
-    frames.lock().unwrap_or_else(PoisonError::into_inner)
 }

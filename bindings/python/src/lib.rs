@@ -2,15 +2,21 @@
 
 mod boxes;
 mod decision;
+mod engine;
 mod error;
+mod filter;
 mod finder;
 mod frame;
+mod handles;
 mod hardware;
+mod held;
 mod memory;
-mod narrow;
 mod one_shot;
+mod snapshot;
+mod space;
 mod start;
 mod tuning;
+mod view;
 
 use pyo3::prelude::*;
 
@@ -25,7 +31,13 @@ mod _sapwise {
     #[pymodule_export]
     use super::one_shot::{last_decision, pairs, pairs_between};
     #[pymodule_export]
+    use super::snapshot::restored_space;
+    #[pymodule_export]
+    use super::space::PySpace;
+    #[pymodule_export]
     use super::tuning::{PyTuning, predict};
+    #[pymodule_export]
+    use super::view::PyView;
 
     use super::*;
 

@@ -1,166 +1,93 @@
 //! `pairs` and `pairs_between`: each call stands for itself.
 
-use crate::boxes::boxes;
+use crate::boxes::{Boxes, Corners, boxes};
 use crate::decision::PyDecision;
-use crate::error::{exception, unusable};
+use crate::engine::{Exactly, Search, What, search};
+use crate::error::{call, exception, invalid_box, unusable};
+use crate::filter::Keywords;
 use crate::start;
-use numpy::ndarray::Array2;
-use numpy::{IntoPyArray, PyArray2};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use sapwise::tuning::Step;
-use sapwise::{Adaptive, AlgorithmId, Between, BroadPhase, Error, PairOrder, Pairs, Registry, Tuning};
-use sapwise_tune::StartOptions;
-use std::sync::{Arc, Mutex, PoisonError};
+use sapwise::{Aabb, Error, Filter, Membership};
+use std::borrow::Cow;
 
-/// The method that keeps work from frame to frame: of no use here.
-const INCREMENTAL: &str = "pair-cache";
-
-/// Built-in thresholds, in boxes, for an unknown machine: `grid-sap` replaces `brute` from the first on, and runs on
-/// `k` threads from `k` squared times the second on. Rounded from `uniform` and `clustered` in `datasets/`.
-const GRID_FROM: u32 = 300;
-const THREADS_FROM: u32 = 2500;
-const MOST_THREADS: u32 = 16;
-
-/// Largest call whose buffers are kept for the next: a few hundred megabytes.
-const MOST_BOXES_KEPT: usize = 2_000_000;
-const MOST_PAIRS_KEPT: usize = 16_000_000;
-/// Most engines that are kept: one for each of so many threads that call at once.
-const MOST_KEPT: usize = 8;
-
-/// What searches, with its lists of pairs, used by one call at a time.
-struct Engine {
-    adaptive: Adaptive,
-    between: Between,
-    /// The list in any order, and the one in canonical order.
-    pairs: [Option<Pairs>; 2],
+/// What `pairs` and `pairs_between` can be asked for beside the boxes.
+struct Wishes<'a> {
+    filter: Option<Vec<Membership>>,
+    margin: f64,
+    algorithm: Option<&'a str>,
+    worlds: Option<Vec<i64>>,
+    ordered: bool,
+    limit: Option<usize>,
 }
 
-/// Engines that no call uses. Locked only by a thread with the interpreter's lock, and for an instant: no fork finds it
-/// locked.
-struct Idle {
-    /// The process that made the engines. Their threads are not in a forked one.
-    pid: u32,
-    engines: Vec<Engine>,
-}
-
-static IDLE: Mutex<Idle> = Mutex::new(Idle { pid: 0, engines: Vec::new() });
-
-fn idle<T>(_: Python<'_>, with: impl FnOnce(&mut Vec<Engine>) -> T) -> T {
-    let mut idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner);
-    let pid = std::process::id();
-    if idle.pid != pid {
-        // After a fork. Dropping them would wait for threads that are not in this process.
-        std::mem::forget(std::mem::take(&mut idle.engines));
-        idle.pid = pid;
-    }
-    with(&mut idle.engines)
-}
-
-/// Drops the idle engines, so that later calls use the tuning that was saved since.
-pub(crate) fn start_again(py: Python<'_>) {
-    let engines = idle(py, std::mem::take);
-    py.detach(|| drop(engines));
-}
-
-impl Engine {
-    /// With the tuning that was kept of this machine, or with built-in thresholds. Nothing is measured.
-    fn new() -> Result<Self, Error> {
-        let registry = Arc::new(Registry::new());
-        let options = StartOptions::new().background(false).measure(None).registry(Arc::clone(&registry));
-        let mut tuning = sapwise_tune::for_this_machine(&options)?.tuning().clone();
-        tuning.costs.retain(|cost| cost.algorithm.method() != INCREMENTAL);
-        let mut adaptive = Adaptive::new(if tuning.costs.is_empty() { usual(&registry)? } else { tuning }, &registry)?;
-        adaptive.set_exploring(false);
-        Ok(Self { adaptive, between: Between::new(&registry)?, pairs: [None, None] })
-    }
-
-    /// Lets `find` search, and returns the pairs flat, as in NumPy. `from_second` is subtracted from the second member
-    /// of each pair.
-    fn find(
-        &mut self,
-        order: PairOrder,
-        limit: Option<usize>,
-        from_second: u32,
-        find: impl FnOnce(&mut Adaptive, &mut Between, &mut Pairs) -> Result<(), Error>,
-    ) -> Result<Vec<u32>, Error> {
-        let Self { adaptive, between, pairs } = self;
-        let pairs = pairs[usize::from(order == PairOrder::Canonical)].get_or_insert_with(|| start::pairs(order, None));
-        let usual_limit = pairs.limit();
-        if limit.is_some() {
-            pairs.set_limit(limit);
+impl Wishes<'_> {
+    /// Refuses what excludes each other.
+    fn check(&self, py: Python<'_>) -> PyResult<()> {
+        if !(self.margin >= 0.0 && self.margin.is_finite()) {
+            return Err(unusable(py, format!("margin is {}; give 0 or more and finite", self.margin)));
         }
-        let found = find(adaptive, between, pairs);
-        pairs.set_limit(usual_limit);
-        found?;
-        flat(pairs, from_second)
+        if self.algorithm.is_some() && self.worlds.is_some() {
+            return Err(unusable(py, "algorithm and worlds exclude each other; give one of them"));
+        }
+        Ok(())
     }
 
-    fn is_small(&self) -> bool {
-        self.pairs.iter().flatten().map(Pairs::len).sum::<usize>() <= MOST_PAIRS_KEPT
+    /// Returns these boxes grown: those of a pair are then no further apart than the margin on each axis.
+    fn grown<'b>(&self, py: Python<'_>, given: &'b Boxes<'_>, which: &str) -> PyResult<Cow<'b, [Aabb]>> {
+        let boxes = given.as_slice()?;
+        if self.margin == 0.0 {
+            return Ok(Cow::Borrowed(boxes));
+        }
+        // Growing hides what is inverted. Rounded up.
+        Aabb::check(boxes, 0).map_err(|error| exception(py, &error, which))?;
+        let by = Aabb::from_f64([self.margin; 3], [self.margin; 3]).max;
+        Ok(Cow::Owned(py.detach(|| boxes.iter().map(|aabb| aabb.swept(by)).collect())))
     }
-}
 
-/// Returns the built-in thresholds, without incremental algorithms.
-fn usual(registry: &Registry) -> Result<Tuning, Error> {
-    let known: Vec<AlgorithmId> = registry.available().into_iter().map(|entry| entry.id).collect();
-    let step = |from: u32, method: &str, threads: u32| {
-        let id = known.iter().find(|id| id.method() == method && id.threads() == threads)?;
-        Some(Step::new(from, id.clone()))
-    };
-    let mut steps: Vec<Step> = step(0, "brute", 1).into_iter().chain(step(GRID_FROM, "grid-sap", 1)).collect();
-    let mut widths: Vec<u32> =
-        known.iter().map(AlgorithmId::threads).filter(|k| (2..=MOST_THREADS).contains(k)).collect();
-    widths.sort_unstable();
-    widths.dedup();
-    steps.extend(widths.into_iter().filter_map(|k| step(THREADS_FROM * k * k, "grid-sap", k)));
-    Tuning::from_steps(steps).map_err(|_| Error::NoAlgorithm)
-}
+    /// Returns the corners of both members of a pair if the answer for 32-bit boxes may have pairs too many.
+    fn exactly<'b>(&self, corners: [Corners<'b>; 2]) -> Option<Exactly<'b>> {
+        let wide = corners.iter().any(|of| matches!(of, Corners::Wide(_)));
+        (wide || self.margin > 0.0).then_some(Exactly { corners, margin: self.margin })
+    }
 
-/// Converts pairs to numbers, two each.
-pub(crate) fn flat(pairs: &Pairs, from_second: u32) -> Result<Vec<u32>, Error> {
-    let mut numbers = Vec::new();
-    let refused = |_| Error::OutOfMemory { what: "pairs", elements: pairs.len() };
-    numbers.try_reserve_exact(2 * pairs.len()).map_err(refused)?;
-    numbers.extend(pairs.iter().flat_map(|&(a, b)| [a, b - from_second]));
-    Ok(numbers)
-}
-
-/// Makes an array with two numbers a row.
-pub(crate) fn two_columns<'py, T: numpy::Element>(
-    py: Python<'py>,
-    numbers: Vec<T>,
-) -> PyResult<Bound<'py, PyArray2<T>>> {
-    let rows = Array2::from_shape_vec([numbers.len() / 2, 2], numbers);
-    rows.map(|rows| rows.into_pyarray(py)).map_err(|why| unusable(py, why.to_string()))
-}
-
-/// Runs a call on an engine, without the interpreter's lock. Checks for Ctrl-C before and after.
-fn with_engine<'py>(
-    py: Python<'py>,
-    objects: usize,
-    find: impl FnOnce(&mut Engine) -> Result<Vec<u32>, Error> + Send,
-    error: impl FnOnce(Error) -> PyErr,
-) -> PyResult<Bound<'py, PyArray2<u32>>> {
-    py.check_signals()?;
-    let engine = idle(py, Vec::pop);
-    let (found, engine) = py.detach(|| {
-        let mut engine = match engine.map_or_else(Engine::new, Ok) {
-            Ok(engine) => engine,
-            Err(why) => return (Err(why), None),
+    /// Returns the search of one list by these wishes. Positions in the answer are those of `boxes`.
+    fn search<'b>(self, boxes: &'b mut Cow<'_, [Aabb]>, exactly: Option<Exactly<'b>>, from_second: u32) -> Search<'b>
+    where
+        Self: 'b,
+    {
+        let Self { mut filter, algorithm, worlds, ordered, limit, .. } = self;
+        let mut places = None;
+        let what = match (algorithm, worlds) {
+            (Some(name), _) => What::By(name, boxes),
+            (None, None) => What::All(boxes),
+            (None, Some(keys)) => {
+                if !keys.is_sorted() {
+                    let mut by_world: Vec<u32> = (0..keys.len() as u32).collect();
+                    by_world.sort_by_key(|&k| keys[k as usize]);
+                    *boxes = by_world.iter().map(|&k| boxes[k as usize]).collect();
+                    filter = filter.map(|of| by_world.iter().map(|&k| of[k as usize]).collect());
+                    places = Some(by_world);
+                }
+                let key = |k: usize| keys[places.as_ref().map_or(k, |places| places[k] as usize)];
+                let starts = (0..=keys.len()).filter(|&k| k == 0 || k == keys.len() || key(k) != key(k - 1)).collect();
+                What::Worlds(boxes, starts)
+            }
         };
-        let found = find(&mut engine);
-        let kept = objects <= MOST_BOXES_KEPT && engine.is_small();
-        (found, kept.then_some(engine))
-    });
-    if let Some(engine) = engine {
-        let over = idle(py, |engines| {
-            engines.push(engine);
-            (engines.len() > MOST_KEPT).then(|| engines.remove(0))
-        });
-        py.detach(|| drop(over));
+        let filter = filter.map(Filter::new);
+        Search { what, order: start::order(ordered), limit, filter, exactly, places, from_second }
     }
-    py.check_signals()?;
-    two_columns(py, found.map_err(error)?)
+}
+
+/// Converts the argument `worlds` for `count` boxes, or for a pair of lists.
+fn worlds<'py>(
+    py: Python<'py>,
+    worlds: Option<&Bound<'py, PyAny>>,
+    count: impl IntoPyObject<'py>,
+) -> PyResult<Option<Vec<i64>>> {
+    let Some(worlds) = worlds else { return Ok(None) };
+    let keys = call(py, "sapwise._arrays", "worlds", (worlds, count))?;
+    Ok(Some(keys.cast::<PyArray1<i64>>()?.to_vec()?))
 }
 
 /// Find all pairs of overlapping boxes.
@@ -172,10 +99,23 @@ fn with_engine<'py>(
 /// Parameters
 /// ----------
 /// boxes : array_like, shape (n, 6) or (n, 2, 3)
-///     One box a row: minx, miny, minz, maxx, maxy, maxz, in any unit of length. With ``upper``: the lower corners,
-///     shape (n, 3).
-/// upper : array_like, shape (n, 3), optional
+///     One box a row: minx, miny, minz, maxx, maxy, maxz, in any unit of length; in two dimensions (n, 4) or (n, 2, 2).
+///     With ``upper``: the lower corners, shape (n, 3) or (n, 2).
+/// upper : array_like, shape (n, 3) or (n, 2), optional
 ///     The upper corners.
+/// groups, masks : array_like of int, optional
+///     One bit a group, 32 bits, for each box or for all: two boxes are a pair only if each has a group that is in the
+///     mask of the other. By default a box is in every group, and its mask allows every group.
+/// owner : array_like of int, optional
+///     What each box is a part of, such as a body: two boxes with the same owner are no pair. 0 is no owner.
+/// fixed : array_like of bool, optional
+///     Which boxes never move: two of them are no pair.
+/// margin : float, default 0.0
+///     Boxes are a pair too if they are no further apart than this on each axis.
+/// algorithm : str, optional
+///     Run this algorithm, for instance ``"bvh@cpu1"``.
+/// worlds : array_like of int, optional
+///     The world of each box: boxes of different worlds are no pair. Worlds may be many and small.
 /// ordered : bool, default True
 ///     Whether the pairs are sorted, by the first member and then the second: the same array from every machine. False
 ///     saves the sort.
@@ -194,7 +134,7 @@ fn with_engine<'py>(
 ///     A bound is NaN or a minimum lies above its maximum. ``index`` names the first such box. Infinite bounds are
 ///     legal.
 /// InputError
-///     The shape is wrong, or there are more boxes than 32 bits can name.
+///     The shape is wrong, there are more boxes than 32 bits can name, or another argument can't be used.
 /// TypeError
 ///     The dtype can't be converted: bool, complex, object, text, long double.
 /// TooManyPairsError
@@ -203,8 +143,9 @@ fn with_engine<'py>(
 /// Notes
 /// -----
 /// 32-bit floats of shape (n, 6) in C order are read in place; nothing may write to them meanwhile.
-/// Everything else is copied. 64-bit floats are rounded to 32 bits: no pair is lost, and nearly touching boxes may gain
-/// one. The interpreter's lock is released. Ctrl-C works before and after, not within.
+/// Everything else is copied. 64-bit floats and integers give the pairs of 64-bit arithmetic: they are searched rounded
+/// outward to 32 bits, and pairs that only rounding has made are dropped. The interpreter's lock is released. Ctrl-C
+/// works before and after, not within.
 ///
 /// Examples
 /// --------
@@ -213,20 +154,39 @@ fn with_engine<'py>(
 /// >>> sapwise.pairs(boxes)
 /// array([[0, 1]], dtype=uint32)
 #[pyfunction]
-#[pyo3(signature = (boxes, upper=None, *, ordered=true, limit=None))]
+#[pyo3(signature = (
+    boxes, upper=None, *, groups=None, masks=None, owner=None, fixed=None, margin=0.0, algorithm=None, worlds=None,
+    ordered=true, limit=None,
+))]
+#[expect(clippy::too_many_arguments, reason = "they have names in Python")]
 pub(crate) fn pairs<'py>(
     boxes: &Bound<'py, PyAny>,
     upper: Option<&Bound<'py, PyAny>>,
+    groups: Option<&Bound<'py, PyAny>>,
+    masks: Option<&Bound<'py, PyAny>>,
+    owner: Option<&Bound<'py, PyAny>>,
+    fixed: Option<&Bound<'py, PyAny>>,
+    margin: f64,
+    algorithm: Option<&str>,
+    worlds: Option<&Bound<'py, PyAny>>,
     ordered: bool,
-    limit: Option<usize>,
+    #[pyo3(from_py_with = start::limit)] limit: Option<usize>,
 ) -> PyResult<Bound<'py, PyArray2<u32>>> {
     let py = boxes.py();
     let given = crate::boxes::boxes(boxes, upper, "")?;
-    let boxes = given.as_slice()?;
-    let find = |engine: &mut Engine| {
-        engine.find(start::order(ordered), limit, 0, |adaptive, _, pairs| adaptive.find_pairs(boxes, pairs))
-    };
-    with_engine(py, boxes.len(), find, |error| exception(py, &error, ""))
+    let count = given.as_slice()?.len();
+    let filter = Keywords { groups, masks, owner, fixed }.memberships(py, count)?;
+    let worlds = self::worlds(py, worlds, count)?;
+    let wishes = Wishes { filter, margin, algorithm, worlds, ordered, limit };
+    wishes.check(py)?;
+    let mut grown = wishes.grown(py, &given, "")?;
+    if wishes.worlds.is_some() {
+        // Before they are put in another order.
+        Aabb::check(&grown, 0).map_err(|error| exception(py, &error, ""))?;
+    }
+    let corners = given.corners()?;
+    let exactly = wishes.exactly([corners, corners]);
+    search(py, count, wishes.search(&mut grown, exactly, 0), |error| exception(py, &error, ""))
 }
 
 /// Find all pairs of a box of ``a`` and an overlapping box of ``b``.
@@ -237,9 +197,13 @@ pub(crate) fn pairs<'py>(
 /// Parameters
 /// ----------
 /// a : array_like, shape (n, 6) or (n, 2, 3)
-///     One box a row: minx, miny, minz, maxx, maxy, maxz.
+///     One box a row: minx, miny, minz, maxx, maxy, maxz; in two dimensions (n, 4) or (n, 2, 2).
 /// b : array_like, shape (k, 6) or (k, 2, 3)
 ///     The other boxes.
+/// groups, masks, owner, fixed, worlds : pair of array_like, optional
+///     As in ``pairs``: for the boxes of ``a``, then for those of ``b``. None in place of one is the default.
+/// margin, algorithm
+///     As in ``pairs``.
 /// ordered : bool, default True
 ///     Whether the pairs are sorted, by the first member and then the second.
 /// limit : int, optional
@@ -256,7 +220,8 @@ pub(crate) fn pairs<'py>(
 ///     A bound is NaN or a minimum lies above its maximum. ``index`` names the first such box. Infinite bounds are
 ///     legal.
 /// InputError
-///     The shape is wrong, or there are more boxes than 32 bits can name.
+///     The shape is wrong, there are more boxes than 32 bits can name, or another argument can't be used. ``owner``
+///     excludes ``algorithm`` and ``worlds``, which exclude each other.
 /// TypeError
 ///     The dtype can't be converted: bool, complex, object, text, long double.
 /// TooManyPairsError
@@ -267,32 +232,64 @@ pub(crate) fn pairs<'py>(
 /// >>> sapwise.pairs_between([[0, 0, 0, 1, 1, 1]], [[9, 9, 9, 10, 10, 10], [1, 1, 1, 2, 2, 2]])
 /// array([[0, 1]], dtype=uint32)
 #[pyfunction]
-#[pyo3(signature = (a, b, *, ordered=true, limit=None))]
+#[pyo3(signature = (
+    a, b, *, groups=None, masks=None, owner=None, fixed=None, margin=0.0, algorithm=None, worlds=None, ordered=true,
+    limit=None,
+))]
+#[expect(clippy::too_many_arguments, reason = "they have names in Python")]
 pub(crate) fn pairs_between<'py>(
     a: &Bound<'py, PyAny>,
     b: &Bound<'py, PyAny>,
+    groups: Option<&Bound<'py, PyAny>>,
+    masks: Option<&Bound<'py, PyAny>>,
+    owner: Option<&Bound<'py, PyAny>>,
+    fixed: Option<&Bound<'py, PyAny>>,
+    margin: f64,
+    algorithm: Option<&str>,
+    worlds: Option<&Bound<'py, PyAny>>,
     ordered: bool,
-    limit: Option<usize>,
+    #[pyo3(from_py_with = start::limit)] limit: Option<usize>,
 ) -> PyResult<Bound<'py, PyArray2<u32>>> {
     let py = a.py();
-    let (a, b) = (boxes(a, None, " of a")?, boxes(b, None, " of b")?);
-    let (a, b) = (a.as_slice()?, b.as_slice()?);
-    let first = a.len();
-    let objects = first + b.len();
+    let (of_a, of_b) = (boxes(a, None, " of a")?, boxes(b, None, " of b")?);
+    let (first, second) = (of_a.as_slice()?.len(), of_b.as_slice()?.len());
+    let objects = first + second;
     let Ok(from_second) = u32::try_from(objects).map(|_| first as u32) else {
         return Err(exception(py, &Error::TooManyObjects { objects }, ""));
     };
-    let find = |engine: &mut Engine| {
-        engine.find(start::order(ordered), limit, from_second, |_, between, pairs| between.find_pairs(a, b, pairs))
-    };
-    with_engine(py, objects, find, |error| match error {
-        Error::InvalidBox { index, defect } if index < first => crate::error::invalid_box(py, " of a", index, defect),
-        Error::InvalidBox { index, defect } => crate::error::invalid_box(py, " of b", index - first, defect),
+    let filter = Keywords { groups, masks, owner, fixed }.memberships(py, (first, second))?;
+    let worlds = self::worlds(py, worlds, (first, second))?;
+    let mut wishes = Wishes { filter, margin, algorithm, worlds, ordered, limit };
+    wishes.check(py)?;
+    let (grown_a, grown_b) = (wishes.grown(py, &of_a, " of a")?, wishes.grown(py, &of_b, " of b")?);
+    let exactly = wishes.exactly([of_a.corners()?, of_b.corners()?]);
+    let error = |error| match error {
+        Error::InvalidBox { index, defect } if index < first => invalid_box(py, " of a", index, defect),
+        Error::InvalidBox { index, defect } => invalid_box(py, " of b", index - first, defect),
         other => exception(py, &other, ""),
-    })
+    };
+    if wishes.algorithm.is_none() && wishes.worlds.is_none() {
+        let Wishes { filter, ordered, limit, .. } = wishes;
+        let (what, order) = (What::Between(&grown_a, &grown_b), start::order(ordered));
+        let filter = filter.map(Filter::new);
+        return search(py, objects, Search { what, order, limit, filter, exactly, places: None, from_second }, error);
+    }
+    // As one list, in which each of the two has one owner: two boxes of it are no pair.
+    if owner.is_some() {
+        return Err(unusable(
+            py,
+            "owner excludes algorithm and worlds in pairs_between; leave it out, or filter after",
+        ));
+    }
+    let mut joined: Cow<'_, [Aabb]> = Cow::Owned([&*grown_a, &*grown_b].concat());
+    Aabb::check(&joined, 0).map_err(error)?;
+    let mut filter = wishes.filter.unwrap_or_else(|| vec![Membership::ALL; objects]);
+    filter.iter_mut().enumerate().for_each(|(k, of)| of.owner = 1 + u32::from(k >= first));
+    wishes.filter = Some(filter);
+    search(py, objects, wishes.search(&mut joined, exactly, from_second), error)
 }
 
-/// Tell what the last call of ``pairs`` chose and why.
+/// Tell what the last call of ``pairs`` or ``pairs_between`` chose and why.
 ///
 /// Returns
 /// -------
@@ -300,5 +297,5 @@ pub(crate) fn pairs_between<'py>(
 ///     None before the first call. With calls on several threads, that of the call which ended last.
 #[pyfunction]
 pub(crate) fn last_decision(py: Python<'_>) -> Option<PyDecision> {
-    idle(py, |engines| engines.last().and_then(|engine| engine.adaptive.last_decision()).map(PyDecision::from))
+    crate::engine::last_decision(py)
 }

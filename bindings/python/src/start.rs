@@ -1,6 +1,8 @@
 //! The arguments with which a broad phase starts.
 
-use crate::error::{exception, failed, unusable};
+use crate::error::{exception, unusable};
+use crate::tuning::PyTuning;
+use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
 use sapwise::{Adaptive, Error, PairOrder, Pairs, Registry, Tuning};
 use sapwise_tune::StartOptions;
@@ -22,12 +24,38 @@ pub(crate) struct Start {
     pub(crate) algorithm: Option<String>,
     /// A tuning of the caller's.
     pub(crate) tuning: Option<Tuning>,
-    pub(crate) order: PairOrder,
+    pub(crate) ordered: bool,
     /// The most pairs, where the caller says so.
     pub(crate) limit: Option<usize>,
 }
 
 impl Start {
+    /// Takes the arguments that say where the tuning comes from. The others have their defaults.
+    pub(crate) fn new(
+        cache: Option<&Bound<'_, PyAny>>,
+        measure: bool,
+        background: bool,
+        tuning: Option<&PyTuning>,
+        algorithm: Option<String>,
+    ) -> PyResult<Self> {
+        let mut options = options(cache)?.background(background);
+        if !measure {
+            options = options.measure(None);
+        }
+        let no_cache = matches!(cache.map(|c| c.extract::<bool>()), Some(Ok(false)));
+        Ok(Self {
+            options,
+            keeps: algorithm.is_none() && tuning.is_none() && !no_cache,
+            learning: true,
+            exploring: true,
+            threads: None,
+            algorithm,
+            tuning: tuning.map(|of| of.tuning.clone()),
+            ordered: true,
+            limit: None,
+        })
+    }
+
     /// The algorithms to choose from.
     fn registry(&self) -> Arc<Registry> {
         Arc::new(self.threads.map_or_else(Registry::new, Registry::with_cores))
@@ -37,13 +65,7 @@ impl Start {
     pub(crate) fn adaptive(&self) -> Result<Adaptive, Error> {
         let registry = self.registry();
         let mut adaptive = match (&self.algorithm, &self.tuning) {
-            (Some(name), _) => {
-                let parsed = name.parse().map_err(|why: sapwise::error::ParseIdError| Error::UnknownAlgorithm {
-                    text: name.clone(),
-                    hint: format!("{why}; known here: {}", known(&registry)),
-                })?;
-                Adaptive::only(parsed, &registry)?
-            }
+            (Some(name), _) => only(name, &registry)?,
             (None, Some(tuning)) => Adaptive::new(tuning.clone(), &registry)?,
             (None, None) => sapwise_tune::for_this_machine(&self.options.clone().registry(registry))?,
         };
@@ -54,7 +76,7 @@ impl Start {
 
     /// Makes an empty list of pairs with the caller's limit, or the default limit.
     pub(crate) fn pairs(&self) -> Pairs {
-        pairs(self.order, self.limit)
+        pairs(order(self.ordered), self.limit)
     }
 }
 
@@ -70,9 +92,49 @@ pub(crate) fn order(ordered: bool) -> PairOrder {
     if ordered { PairOrder::Canonical } else { PairOrder::Any }
 }
 
-fn known(registry: &Registry) -> String {
-    let names: Vec<String> = registry.available().iter().map(|entry| entry.id.to_string()).collect();
-    names.join(", ")
+/// Makes what always runs the algorithm of this name.
+pub(crate) fn only(name: &str, registry: &Registry) -> Result<Adaptive, Error> {
+    let parsed = name.parse().map_err(|_| {
+        let known: Vec<String> = registry.available().iter().map(|entry| entry.id.to_string()).collect();
+        let method = |id: &&String| id.split('@').next() == Some(name);
+        let same: Vec<String> = known.iter().filter(method).cloned().collect();
+        let hint = if same.is_empty() {
+            format!("known here: {}", known.join(", "))
+        } else {
+            format!("name its threads too: {}", same.join(" or "))
+        };
+        Error::UnknownAlgorithm { text: name.to_owned(), hint }
+    })?;
+    Adaptive::only(parsed, registry)
+}
+
+/// Converts the argument `limit`.
+pub(crate) fn limit(given: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
+    whole(given, "limit is", "; give 0 or more pairs, or None for what the memory allows")
+}
+
+/// Converts the argument `threads`.
+pub(crate) fn threads(given: &Bound<'_, PyAny>) -> PyResult<Option<u32>> {
+    let fix = "; give 1 or more, or None for all usable cores";
+    match whole(given, "threads is", fix)? {
+        Some(0) => Err(unusable(given.py(), format!("threads is 0{fix}"))),
+        threads => Ok(threads.map(|threads| u32::try_from(threads).unwrap_or(u32::MAX))),
+    }
+}
+
+/// Converts the argument `k`.
+pub(crate) fn k(given: &Bound<'_, PyAny>) -> PyResult<usize> {
+    whole(given, "k is", "; give 0 or more").map(Option::unwrap_or_default)
+}
+
+/// Converts a whole number. One that is negative or huge is an error of these words.
+fn whole(given: &Bound<'_, PyAny>, what: &str, fix: &str) -> PyResult<Option<usize>> {
+    given.extract::<Option<usize>>().map_err(|why| {
+        if why.is_instance_of::<PyOverflowError>(given.py()) {
+            return unusable(given.py(), format!("{what} {given}{fix}"));
+        }
+        PyTypeError::new_err(format!("{what} {given}{fix}"))
+    })
 }
 
 /// Options with the cache that the caller wants: `None` for the user's folder, `False` for none, or a folder.
@@ -95,11 +157,11 @@ pub(crate) fn seconds(py: Python<'_>, name: &str, seconds: f64) -> PyResult<Dura
 
 /// Makes an adaptive broad phase without the interpreter's lock. Checks for Ctrl-C before and after.
 pub(crate) fn adaptive(py: Python<'_>, start: &Start) -> PyResult<Adaptive> {
+    if start.algorithm.is_some() && start.tuning.is_some() {
+        return Err(unusable(py, "algorithm and tuning exclude each other; give one of them"));
+    }
     py.check_signals()?;
     let made = py.detach(|| start.adaptive());
     py.check_signals()?;
-    made.map_err(|error| match error {
-        Error::Unavailable { .. } => failed(py, error.to_string()),
-        _ => exception(py, &error, ""),
-    })
+    made.map_err(|error| exception(py, &error, ""))
 }

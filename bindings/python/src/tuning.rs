@@ -195,6 +195,10 @@ impl PyTuning {
         json::tuning(text).map(Self::from).map_err(|why| unusable(py, with_cause(&why)))
     }
 
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
+        Ok((py.get_type::<Self>().getattr("from_json")?, (self.to_json(py)?,)))
+    }
+
     fn __repr__(&self) -> String {
         let fields: Vec<String> =
             self.tuning.steps.iter().map(|step| format!("{} from {}", step.algorithm, step.from_objects)).collect();
@@ -280,6 +284,6 @@ pub(crate) fn predict(py: Python<'_>, cache: Option<&Bound<'_, PyAny>>, seconds:
     };
     let _ = py.detach(|| thread.join());
     let (tuning, setup) = made.map_err(|error| failed(py, error.to_string()))?;
-    crate::one_shot::start_again(py);
+    crate::engine::start_again(py);
     Ok(PyTuning { tuning, setup: Some(setup) })
 }

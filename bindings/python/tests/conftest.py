@@ -1,6 +1,8 @@
 """Oracles, scenes, and a cache folder of the tests' own."""
 
+import atexit
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -10,7 +12,11 @@ import numpy as np
 import pytest
 
 # Before the first use: no test reads or writes the cache of the user.
-os.environ["XDG_CACHE_HOME"] = tempfile.mkdtemp(prefix="sapwise-tests-")
+if "SAPWISE_TESTS" not in os.environ:
+    # What a test starts in a process of its own shares the folder, and a fork leaves it to its parent.
+    FOLDER, OWNER = tempfile.mkdtemp(prefix="sapwise-tests-"), os.getpid()
+    os.environ["XDG_CACHE_HOME"] = os.environ["SAPWISE_TESTS"] = FOLDER
+    atexit.register(lambda: os.getpid() == OWNER and shutil.rmtree(FOLDER, ignore_errors=True))
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -35,6 +41,13 @@ def cubes(count, seed=0, half=0.5, world=None):
     world = world if world is not None else max(2.0, count ** (1 / 3) * 2)
     centres = np.round(rng.uniform(0, world, (count, 3)) * 64) / 64
     return np.concatenate([centres - half, centres + half], axis=1).astype(np.float32)
+
+
+def allowed(groups, masks, owner, fixed):
+    """A matrix: which two of these boxes may be a pair."""
+    groups, masks, owner, fixed = (np.asarray(of)[:, None] for of in (groups, masks, owner, fixed))
+    by_group = (groups & masks.T != 0) & (groups.T & masks != 0)
+    return by_group & ~(fixed & fixed.T) & ((owner != owner.T) | (owner == 0))
 
 
 def mixed(count, seed=0):
@@ -62,12 +75,6 @@ def run(script, *arguments, timeout=120, **environment):
 
 
 @pytest.fixture
-def warned_already(monkeypatch):
-    """The warning of a conversion, which comes once in a process, has come."""
-    monkeypatch.setattr("sapwise._arrays._has_warned", True)
-
-
-@pytest.fixture
 def warns_again(monkeypatch):
-    """That warning has not come yet."""
-    monkeypatch.setattr("sapwise._arrays._has_warned", False)
+    """The warnings that come once in a process have not come yet."""
+    monkeypatch.setattr("sapwise._arrays._has_warned", set())

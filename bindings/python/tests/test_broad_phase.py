@@ -100,14 +100,17 @@ def test_groups_masks_and_fixed_boxes():
     boxes = cubes(500, seed=9)
     rng = np.random.default_rng(9)
     groups, masks, fixed = rng.integers(1, 8, 500), rng.integers(0, 8, 500), rng.random(500) < 0.5
+    owner = rng.integers(0, 9, 500)
     pairs = naive(boxes)
     a, b = pairs[:, 0], pairs[:, 1]
     by_group = (groups[a] & masks[b] != 0) & (groups[b] & masks[a] != 0)
     by_fixed = ~(fixed[a] & fixed[b])
+    by_owner = (owner[a] != owner[b]) | (owner[a] == 0)
     with quiet() as broad_phase:
         for arguments, wanted in [
             ({"groups": groups, "masks": masks}, by_group),
             ({"fixed": fixed}, by_fixed),
+            ({"owner": owner, "groups": 1}, by_owner),
             ({"groups": groups.tolist(), "masks": masks, "fixed": fixed.tolist()}, by_group & by_fixed),
             ({"masks": masks}, (masks[a] != 0) & (masks[b] != 0)),
             ({}, np.ones(len(pairs), bool)),
@@ -124,6 +127,7 @@ def test_groups_masks_and_fixed_boxes():
         ({"groups": [1, 2], "masks": [1]}, "masks has 1"),
         ({"groups": [1, 2], "fixed": [True]}, "fixed has 1"),
         ({"groups": [1, -1]}, "groups of box 1 is -1"),
+        ({"groups": 1, "owner": 5}, "single number"),
         ({"masks": [1, 2**32]}, "masks of box 1"),
         ({"groups": [0.5]}, "whole"),
         ({"fixed": [1, 0]}, "True or False"),
@@ -220,7 +224,11 @@ def test_one_algorithm_always_and_a_tuning_of_the_caller():
     [
         ({"algorithm": "fastest"}, "known here: .*bvh@cpu1"),
         ({"algorithm": "octree@cpu1"}, "known here"),
+        ({"algorithm": "grid-sap"}, "name its threads too: grid-sap@cpu1"),
+        ({"algorithm": "bvh@cpu1", "tuning": sapwise.Space(cache=False, measure=False).tuning}, "exclude each other"),
         ({"threads": 0}, "threads is 0"),
+        ({"threads": -1}, "threads is -1"),
+        ({"limit": -1}, "limit is -1"),
         ({"cache": 5}, "cache is a folder"),
     ],
 )
@@ -230,7 +238,7 @@ def test_arguments_that_can_not_be(arguments, why):
 
 
 def test_more_threads_than_there_are_cores_is_an_error():
-    with pytest.raises(sapwise.SapwiseError, match="but this machine has"):
+    with pytest.raises(sapwise.SapwiseError, match="needs 2 threads, and 1 may be used"):
         quiet(algorithm="bvh@cpu2", threads=1)
 
 

@@ -1,6 +1,7 @@
 """Every kind of input: the right answer or an exception that says what to do, never a crash."""
 
 import pickle
+import warnings
 
 import numpy as np
 import pytest
@@ -64,7 +65,8 @@ def test_no_boxes(given):
 @pytest.mark.parametrize(
     "shape, hint",
     [
-        ((5, 4), "shape"),
+        ((5, 5), "shape"),
+        ((5, 2, 4), "shape"),
         ((5, 3), "lower corners alone"),
         ((6, 5), "transpose"),
         ((6,), "shape"),
@@ -84,6 +86,8 @@ def test_wrong_corners():
         sapwise.pairs(np.zeros((3, 3)), np.zeros((2, 3)))
     with pytest.raises(sapwise.InputError, match="upper has shape"):
         sapwise.pairs(np.zeros((3, 3)), np.zeros((3, 6)))
+    with pytest.raises(sapwise.InputError, match="lower corners have 3 axes and the upper ones 2"):
+        sapwise.pairs(np.zeros((3, 3)), np.zeros((3, 2)))
 
 
 @pytest.mark.parametrize(
@@ -130,21 +134,79 @@ def test_an_invalid_box_is_named(dtype, index, defect):
         sapwise.pairs(boxes[:, :3], boxes[:, 3:])
 
 
+def test_two_dimensions():
+    rng = np.random.default_rng(3)
+    low = np.round(rng.uniform(0, 20, (400, 2)) * 64) / 64
+    flat = np.concatenate([low, low + 1], axis=1)
+    deep = np.concatenate([low, np.zeros((400, 1)), low + 1, np.zeros((400, 1))], axis=1)
+    known = naive(deep)
+    assert len(known) > 100
+    for boxes in (flat, flat.astype(np.float32), flat.tolist(), flat.reshape(-1, 2, 2)):
+        assert np.array_equal(sapwise.pairs(boxes), known)
+    assert np.array_equal(sapwise.pairs(flat[:, :2], flat[:, 2:]), known)
+    assert np.array_equal(sapwise.pairs_between(flat[:9], flat), naive(deep[:9], deep))
+    flat[7, 1] = 99
+    with pytest.raises(sapwise.InvalidBoxError, match="box 7 is inverted"):
+        sapwise.pairs(flat)
+
+
 #: Beside each other, a hair apart, and as far as a 32-bit float can tell.
 special = [0.1, 0.1 + 1e-17, 0.1 + 1e-12, 0.1 - 1e-12, 0.3, 0.1 + 0.2, 0.1000001, 1e300, -1e300, 1e-300, -np.inf, np.inf]
 near = st.sampled_from(special) | st.floats(-1, 1)
 
 
 @settings(max_examples=300, deadline=None)
-@given(arrays.arrays(np.float64, st.tuples(st.integers(0, 20), st.just(2), st.just(3)), elements=near))
-def test_no_pair_of_doubles_is_lost(corners):
+@given(
+    arrays.arrays(np.float64, st.tuples(st.integers(0, 20), st.just(2), st.just(3)), elements=near),
+    st.sampled_from([0.0, 0.1, 1e-12, 0.30000001]),
+)
+def test_pairs_of_doubles_are_those_of_doubles(corners, margin):
     boxes = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
-    found = sapwise.pairs(boxes)
-    assert {tuple(p) for p in found.tolist()} >= {tuple(p) for p in naive(boxes).tolist()}
-    # And none is added but those that floats can't tell apart.
+    grown = boxes + [0, 0, 0, margin, margin, margin]
+    assert np.array_equal(sapwise.pairs(boxes, margin=margin), naive(grown))
+    assert np.array_equal(sapwise.pairs(boxes[:, :3], boxes[:, 3:]), naive(boxes))
+    a, b = boxes[:9], boxes[9:]
+    assert np.array_equal(sapwise.pairs_between(a, b, margin=margin), naive(grown[:9], grown[9:]))
     with np.errstate(over="ignore"):
-        assert np.array_equal(found, naive(boxes.astype(np.float32)))
-    assert np.array_equal(found, sapwise.pairs(boxes[:, :3], boxes[:, 3:]))
+        short = b.astype(np.float32)
+    assert np.array_equal(sapwise.pairs_between(a, short), naive(a, short))
+
+
+@settings(max_examples=100, deadline=None)
+@given(arrays.arrays(np.float64, st.tuples(st.integers(0, 20), st.just(2), st.just(3)), elements=near))
+def test_frames_and_spaces_lose_no_pair_of_doubles(corners):
+    boxes = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
+    known = {tuple(p) for p in naive(boxes).tolist()}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", sapwise.RoundingWarning)
+        with sapwise.BroadPhase(cache=False, measure=False, threads=1) as broad_phase:
+            assert {tuple(p) for p in broad_phase.find(boxes).tolist()} >= known
+        with sapwise.Space(cache=False, measure=False, threads=1) as space:
+            handles = space.insert(boxes)
+            space.update()
+            found = {tuple(p) for p in np.searchsorted(handles, space.pairs()).tolist()}
+            kept = space.boxes(handles).astype(float)
+    assert found >= known and (kept[:, :3] <= boxes[:, :3]).all() and (kept[:, 3:] >= boxes[:, 3:]).all()
+
+
+def test_positions_on_a_chromosome():
+    rng = np.random.default_rng(1)
+    start = 248_000_000 + rng.integers(0, 60_000, 600)
+    boxes = np.zeros((600, 6), np.int64)
+    boxes[:, 0], boxes[:, 3] = start, start + rng.integers(0, 100, 600)
+    assert np.array_equal(sapwise.pairs(boxes), naive(boxes)) and len(naive(boxes)) > 50
+    with sapwise.BroadPhase(cache=False, measure=False) as broad_phase, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        assert len(broad_phase.find(boxes)) > len(naive(boxes))
+
+
+def test_rounding_is_told_once_and_only_if_it_can_change_an_answer(warns_again):
+    exact, inexact = np.array([[0, 0, 0, 1, 1, 0.5]]), np.array([[0, 0, 0, 1, 1, 0.1]])
+    with sapwise.Space(cache=False, measure=False) as space, sapwise.BroadPhase(cache=False, measure=False) as frames:
+        space.insert(exact), frames.find(exact), space.insert([[0, 0, 0, 2**24, 1, 1]]), sapwise.pairs(inexact)
+        with pytest.warns(sapwise.RoundingWarning, match="rounded outward"):
+            space.insert(inexact)
+        space.insert(inexact), frames.find(inexact)
 
 
 def test_doubles_beyond_floats_and_an_inversion_that_rounding_would_hide():
@@ -214,6 +276,9 @@ def test_few_boxes_or_boxes_as_they_should_be_warn_not(warns_again):
 
 
 def test_arguments_that_do_not_exist():
-    for wrong in ({"order": True}, {"limit": -1}, {"limit": "many"}):
-        with pytest.raises((TypeError, OverflowError, ValueError)):
+    for wrong in ({"order": True}, {"limit": "many"}, {"limit": 1.5}):
+        with pytest.raises(TypeError):
             sapwise.pairs(BOXES, **wrong)
+    for wrong in (-1, 2**70):
+        with pytest.raises(sapwise.InputError, match=f"limit is {wrong}; give 0 or more"):
+            sapwise.pairs(BOXES, limit=wrong)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import cubes, mixed, naive
+from conftest import allowed, cubes, mixed, naive
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
@@ -136,6 +136,127 @@ def test_the_last_decision_tells_what_ran():
     assert method in {"brute", "sap", "grid-sap", "bvh"} and backend.startswith("cpu")
     assert decision.source in {"default", "predicted", "learned"} and decision.load["objects"] == 5000
     assert decision.algorithm in str(decision) and decision.reason in repr(decision)
+
+
+def keywords(count, seed):
+    rng = np.random.default_rng(seed)
+    bits = {"groups": rng.integers(0, 8, count), "masks": rng.integers(0, 8, count), "owner": rng.integers(0, 9, count)}
+    return {**bits, "fixed": rng.random(count) < 0.5}
+
+
+@pytest.mark.parametrize("more", [{}, {"algorithm": "brute@cpu1"}, {"algorithm": "bvh@cpu1"}, {"worlds": None}])
+def test_filters(more):
+    boxes, given = mixed(900, seed=13), keywords(900, 1)
+    world = np.random.default_rng(3).integers(0, 3, 900)
+    for worlds in (world, np.sort(world)) if "worlds" in more else (np.zeros(900, int),):
+        more = {**more, "worlds": worlds} if "worlds" in more else more
+        may = allowed(**given) & (worlds[:, None] == worlds)
+        known = naive(boxes)
+        known = known[may[known[:, 0], known[:, 1]]]
+        assert np.array_equal(sapwise.pairs(boxes, **given, **more), known) and len(known) > 20
+        unordered = sapwise.pairs(boxes, **given, **more, ordered=False)
+        assert np.array_equal(unordered[np.lexsort((unordered[:, 1], unordered[:, 0]))], known)
+        # Nothing of it is left for the next call.
+        assert np.array_equal(sapwise.pairs(boxes), naive(boxes))
+        if more:
+            del given["owner"]
+        may = allowed(**{"owner": np.zeros(900, int), **given}) & (worlds[:, None] == worlds)
+        known = naive(boxes[:300], boxes[300:])
+        known = known[may[known[:, 0], known[:, 1] + 300]]
+        two = {key: (of[:300], of[300:]) for key, of in {**given, **more}.items() if key != "algorithm"}
+        chosen = {key: of for key, of in more.items() if key == "algorithm"}
+        assert np.array_equal(sapwise.pairs_between(boxes[:300], boxes[300:], **two, **chosen), known)
+        given["owner"] = keywords(900, 1)["owner"]
+
+
+def test_one_value_for_all_and_none_for_the_default():
+    a, b = cubes(200, seed=1), cubes(300, seed=2)
+    groups = np.arange(300) % 4
+    known = naive(a, b)
+    only = known[groups[known[:, 1]] & 2 != 0]
+    assert np.array_equal(sapwise.pairs_between(a, b, masks=(2, None), groups=(None, groups)), only) and len(only) > 20
+    assert len(sapwise.pairs_between(a, b, fixed=(True, True))) == len(sapwise.pairs(a, owner=7)) == 0
+    assert np.array_equal(sapwise.pairs(a, fixed=False, owner=0, groups=1), naive(a))
+
+
+def test_a_margin_finds_neighbours():
+    boxes = cubes(700, seed=3)
+    grown = boxes + np.float32([0, 0, 0, 0.25, 0.25, 0.25])
+    assert np.array_equal(sapwise.pairs(boxes, margin=0.25), naive(grown)) and len(naive(grown)) > len(naive(boxes))
+    assert np.array_equal(sapwise.pairs_between(boxes[:99], boxes[99:], margin=0.25), naive(grown[:99], grown[99:]))
+    inverted = boxes.copy()
+    inverted[5, 0] = inverted[5, 3] + 0.125
+    with pytest.raises(sapwise.InvalidBoxError, match="box 5 is inverted"):
+        sapwise.pairs(inverted, margin=0.25)
+
+
+def test_many_small_worlds():
+    world = np.repeat(np.arange(500), 31)
+    boxes = np.tile(cubes(31, seed=5), (500, 1))
+    known = naive(boxes[:31])
+    assert len(known) > 3
+    expected = (known[None].astype(np.int64) + 31 * np.arange(500)[:, None, None]).reshape(-1, 2)
+    assert np.array_equal(sapwise.pairs(boxes, worlds=world), expected)
+    assert sapwise.last_decision().algorithm == "worlds" and sapwise.last_decision().load["objects"] == 15_500
+    order = np.random.default_rng(1).permutation(len(boxes))
+    found = order[sapwise.pairs(boxes[order], worlds=world[order])]
+    found.sort(axis=1)
+    assert np.array_equal(found[np.lexsort((found[:, 1], found[:, 0]))], expected)
+    boxes[order[3]] = np.nan
+    with pytest.raises(sapwise.InvalidBoxError, match="box 3 "):
+        sapwise.pairs(boxes[order], worlds=world[order])
+    assert sapwise.pairs([], worlds=[]).shape == (0, 2)
+
+
+@pytest.mark.parametrize(
+    "arguments, why",
+    [
+        ({"margin": -0.5}, "margin is -0.5; give 0 or more"),
+        ({"margin": float("nan")}, "margin is NaN"),
+        ({"algorithm": "grid-sap"}, "name its threads too: grid-sap@cpu1"),
+        ({"algorithm": "octree@cpu1"}, "known here"),
+        ({"algorithm": "bvh@cpu1", "worlds": [0] * 9}, "exclude each other"),
+        ({"worlds": [0, 1]}, "worlds has 2 entries and there are 9"),
+        ({"worlds": 0}, "one whole number for each box"),
+        ({"groups": [1] * 8}, "groups has 8"),
+        ({"owner": [2**32] * 9}, "owner of box 0 is 4294967296"),
+        ({"fixed": [1] * 9}, "True or False"),
+    ],
+)
+def test_keywords_that_can_not_be(arguments, why):
+    with pytest.raises(sapwise.InputError, match=why):
+        sapwise.pairs(cubes(9), **arguments)
+    for key in set(arguments) - {"margin", "algorithm"}:
+        with pytest.raises(sapwise.InputError, match=f"{key} is for two lists here"):
+            sapwise.pairs_between(cubes(4), cubes(5), **{key: [1] * 9})
+    with pytest.raises(sapwise.InputError, match="owner excludes"):
+        sapwise.pairs_between(cubes(4), cubes(5), algorithm="sap@cpu1", owner=(1, 2))
+
+
+def test_intervals_on_one_axis_are_swept():
+    start = np.sort(np.random.default_rng(1).integers(0, 100_000, 3000))
+    boxes = np.zeros((3000, 6), np.float32)
+    boxes[:, 0], boxes[:, 3] = start, start + 300
+    assert np.array_equal(sapwise.pairs(boxes), naive(boxes))
+    if sapwise.last_decision().source == "default":
+        assert sapwise.last_decision().algorithm.startswith("sap@")
+
+
+def test_a_decision_for_every_call():
+    boxes = cubes(3000)
+    for call, algorithm in [
+        (lambda: sapwise.pairs(boxes), ""),
+        (lambda: sapwise.pairs_between(boxes[:9], boxes), "between"),
+        (lambda: sapwise.pairs(boxes, algorithm="sap@cpu1"), "sap@cpu1"),
+        (lambda: sapwise.pairs_between(boxes[:9], boxes, algorithm="bvh@cpu1"), "bvh@cpu1"),
+        # So many pairs that what searched is not kept.
+        (lambda: sapwise.pairs(np.zeros((6000, 6), np.float32)), ""),
+    ]:
+        found = call()
+        decision = sapwise.last_decision()
+        assert algorithm in decision.algorithm and (algorithm or "@cpu" in decision.algorithm)
+        assert decision.load["objects"] in {3000, 3009, 6000} and str(decision)
+    assert len(found) == 6000 * 5999 // 2
 
 
 coordinates = st.floats(-4, 4, width=16) | st.sampled_from([-np.inf, np.inf, 0.0, -0.0, 1.0])

@@ -1,0 +1,317 @@
+//! What searches for `pairs` and `pairs_between`, kept from call to call.
+
+use crate::boxes::Corners;
+use crate::decision::PyDecision;
+use crate::error::unusable;
+use crate::start;
+use numpy::IntoPyArray;
+use numpy::PyArray2;
+use numpy::ndarray::Array2;
+use pyo3::prelude::*;
+use sapwise::algorithm::Load;
+use sapwise::tuning::Step;
+use sapwise::{
+    Aabb, Adaptive, AlgorithmId, Between, BroadPhase, Error, Filter, PairOrder, Pairs, Registry, Tuning, Worlds,
+};
+use sapwise_tune::StartOptions;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// The method that keeps work from frame to frame: of no use here.
+const INCREMENTAL: &str = "pair-cache";
+
+/// Built-in thresholds, in boxes, for an unknown machine: `grid-sap` replaces `brute` from the first on, and runs on
+/// `k` threads from `k` squared times the second on. Rounded from `uniform` and `clustered` in `datasets/`.
+const GRID_FROM: u32 = 300;
+const THREADS_FROM: u32 = 2500;
+const MOST_THREADS: u32 = 16;
+
+/// Largest call whose buffers are kept for the next: a few hundred megabytes.
+const MOST_BOXES_KEPT: usize = 2_000_000;
+const MOST_PAIRS_KEPT: usize = 16_000_000;
+/// Most engines that are kept: one for each of so many threads that call at once.
+const MOST_KEPT: usize = 8;
+
+/// A call.
+pub(crate) struct Search<'a> {
+    pub(crate) what: What<'a>,
+    pub(crate) order: PairOrder,
+    pub(crate) limit: Option<usize>,
+    pub(crate) filter: Option<Filter>,
+    /// Drops the pairs that only rounding has made.
+    pub(crate) exactly: Option<Exactly<'a>>,
+    /// The box of the caller at each position, if they were put in another order.
+    pub(crate) places: Option<Vec<u32>>,
+    /// Subtracted from the second member of each pair.
+    pub(crate) from_second: u32,
+}
+
+/// What is searched.
+pub(crate) enum What<'a> {
+    All(&'a [Aabb]),
+    By(&'a str, &'a [Aabb]),
+    Worlds(&'a [Aabb], Vec<usize>),
+    Between(&'a [Aabb], &'a [Aabb]),
+}
+
+/// The corners of both boxes of a pair as the caller gave them, and the most that they may be apart.
+pub(crate) struct Exactly<'a> {
+    pub(crate) corners: [Corners<'a>; 2],
+    pub(crate) margin: f64,
+}
+
+/// What searches, with its lists of pairs, used by one call at a time.
+struct Engine {
+    registry: Arc<Registry>,
+    adaptive: Adaptive,
+    /// Whether built-in thresholds decide.
+    is_usual: bool,
+    /// One for each algorithm that callers have named, with the name.
+    named: Vec<(String, Adaptive)>,
+    between: Between,
+    worlds: Worlds,
+    /// The list in any order, and the one in canonical order.
+    pairs: [Option<Pairs>; 2],
+    ran: Ran,
+}
+
+/// What ran last.
+#[derive(Clone, Copy)]
+enum Ran {
+    Adaptive,
+    /// The one at this position.
+    Named(usize),
+    Between(Load),
+    Worlds(Load),
+}
+
+/// Engines that no call uses. Locked only by a thread with the interpreter's lock, and for an instant: no fork finds it
+/// locked.
+struct Idle {
+    /// The process that made the engines. Their threads are not in a forked one.
+    pid: u32,
+    engines: Vec<Engine>,
+    /// The decision of the last call, if its engine was dropped. Otherwise its engine is the last one.
+    decision: Option<PyDecision>,
+}
+
+static IDLE: Mutex<Idle> = Mutex::new(Idle { pid: 0, engines: Vec::new(), decision: None });
+
+fn idle<T>(_: Python<'_>, with: impl FnOnce(&mut Idle) -> T) -> T {
+    let mut idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner);
+    let pid = std::process::id();
+    if idle.pid != pid {
+        // After a fork. Dropping them would wait for threads that are not in this process.
+        std::mem::forget(std::mem::take(&mut idle.engines));
+        idle.pid = pid;
+    }
+    with(&mut idle)
+}
+
+/// Drops the idle engines, so that later calls use the tuning that was saved since.
+pub(crate) fn start_again(py: Python<'_>) {
+    let engines = idle(py, |idle| {
+        idle.decision = idle.take_decision();
+        std::mem::take(&mut idle.engines)
+    });
+    py.detach(|| drop(engines));
+}
+
+/// Returns what was decided for the last call.
+pub(crate) fn last_decision(py: Python<'_>) -> Option<PyDecision> {
+    idle(py, |idle| {
+        let decision = idle.take_decision();
+        idle.decision.clone_from(&decision);
+        decision
+    })
+}
+
+impl Idle {
+    fn take_decision(&mut self) -> Option<PyDecision> {
+        self.decision.take().or_else(|| self.engines.last().and_then(Engine::decision))
+    }
+}
+
+impl Engine {
+    /// With the tuning that was kept of this machine, or with built-in thresholds. Nothing is measured.
+    fn new() -> Result<Self, Error> {
+        let registry = Arc::new(Registry::new());
+        let options = StartOptions::new().background(false).measure(None).registry(Arc::clone(&registry));
+        let mut tuning = sapwise_tune::for_this_machine(&options)?.tuning().clone();
+        tuning.costs.retain(|cost| cost.algorithm.method() != INCREMENTAL);
+        let is_usual = tuning.costs.is_empty();
+        let mut adaptive = Adaptive::new(if is_usual { usual(&registry)? } else { tuning }, &registry)?;
+        adaptive.set_exploring(false);
+        Ok(Self {
+            adaptive,
+            is_usual,
+            named: Vec::new(),
+            between: Between::new(&registry)?,
+            worlds: Worlds::new(&registry)?,
+            registry,
+            pairs: [None, None],
+            ran: Ran::Adaptive,
+        })
+    }
+
+    /// Searches, and returns the pairs flat, as in NumPy.
+    fn find(&mut self, search: Search<'_>) -> Result<Vec<u32>, Error> {
+        // Pairs of boxes in another order are sorted once they have their own numbers.
+        let order = if search.places.is_some() { PairOrder::Any } else { search.order };
+        let list = &mut self.pairs[usize::from(order == PairOrder::Canonical)];
+        let mut pairs = list.take().unwrap_or_else(|| start::pairs(order, None));
+        let usual_limit = pairs.limit();
+        pairs.set_limit(search.limit.or(usual_limit));
+        pairs.set_filter(search.filter);
+        let found = self.run(search.what, &mut pairs);
+        pairs.set_limit(usual_limit);
+        pairs.set_filter(None);
+        let Search { exactly, places, from_second, .. } = search;
+        let made = found.and_then(|()| {
+            if exactly.is_none() && places.is_none() {
+                return flat(&pairs, from_second);
+            }
+            let mut kept = Vec::new();
+            let refused = |_| Error::OutOfMemory { what: "pairs", elements: pairs.len() };
+            kept.try_reserve_exact(pairs.len()).map_err(refused)?;
+            let place = |at: u32| places.as_ref().map_or(at, |places| places[at as usize]);
+            let own = pairs.iter().map(|&(a, b)| (place(a), place(b)));
+            let own = own.map(|(a, b)| [a.min(b), a.max(b) - from_second]);
+            let wanted = |[a, b]: &[u32; 2]| {
+                exactly.as_ref().is_none_or(|by| by.corners[0].meet(*a, &by.corners[1], *b, by.margin))
+            };
+            kept.extend(own.filter(wanted));
+            if places.is_some() && search.order == PairOrder::Canonical {
+                kept.sort_unstable();
+            }
+            Ok(kept.into_flattened())
+        });
+        self.pairs[usize::from(order == PairOrder::Canonical)] = Some(pairs);
+        made
+    }
+
+    fn run(&mut self, what: What<'_>, pairs: &mut Pairs) -> Result<(), Error> {
+        match what {
+            What::All(boxes) if self.is_usual && lie_on_one_axis(boxes) => {
+                let steps = &self.adaptive.tuning().steps;
+                let step = steps.iter().rfind(|step| step.from_objects as usize <= boxes.len());
+                let sweep = format!("sap@cpu{}", step.map_or(1, |step| step.algorithm.threads()));
+                self.run(What::By(&sweep, boxes), pairs)
+            }
+            What::All(boxes) => {
+                self.ran = Ran::Adaptive;
+                self.adaptive.find_pairs(boxes, pairs)
+            }
+            What::By(name, boxes) => {
+                let at = match self.named.iter().position(|(known, _)| known == name) {
+                    Some(at) => at,
+                    None => {
+                        self.named.push((name.to_owned(), start::only(name, &self.registry)?));
+                        self.named.len() - 1
+                    }
+                };
+                self.ran = Ran::Named(at);
+                self.named[at].1.find_pairs(boxes, pairs)
+            }
+            What::Worlds(boxes, starts) => {
+                let found = self.worlds.find_pairs(boxes, &starts, pairs);
+                self.ran = Ran::Worlds(load(boxes.len(), pairs));
+                found
+            }
+            What::Between(a, b) => {
+                let found = self.between.find_pairs(a, b, pairs);
+                self.ran = Ran::Between(load(a.len() + b.len(), pairs));
+                found
+            }
+        }
+    }
+
+    fn decision(&self) -> Option<PyDecision> {
+        match self.ran {
+            Ran::Adaptive => self.adaptive.last_decision().map(PyDecision::from),
+            Ran::Named(at) => self.named[at].1.last_decision().map(PyDecision::from),
+            Ran::Between(load) => Some(PyDecision::alone("between", "the one search of two lists", load)),
+            Ran::Worlds(load) => Some(PyDecision::alone("worlds", "the one search of many worlds", load)),
+        }
+    }
+
+    fn is_small(&self) -> bool {
+        self.pairs.iter().flatten().map(Pairs::len).sum::<usize>() <= MOST_PAIRS_KEPT
+    }
+}
+
+/// Returns whether most boxes that overlap on the best axis overlap: then nothing is faster than a sweep along it. For
+/// fewer boxes the estimate costs more than it saves.
+fn lie_on_one_axis(boxes: &[Aabb]) -> bool {
+    boxes.len() >= THREADS_FROM as usize && {
+        let load = Load::estimate(boxes, None, None);
+        load.axis_candidates <= 2.0 * load.pairs
+    }
+}
+
+fn load(boxes: usize, pairs: &Pairs) -> Load {
+    Load::of_objects(u32::try_from(boxes).unwrap_or(u32::MAX)).with_pairs(pairs.len() as f64)
+}
+
+/// Returns the built-in thresholds, without incremental algorithms.
+fn usual(registry: &Registry) -> Result<Tuning, Error> {
+    let known: Vec<AlgorithmId> = registry.available().into_iter().map(|entry| entry.id).collect();
+    let step = |from: u32, method: &str, threads: u32| {
+        let id = known.iter().find(|id| id.method() == method && id.threads() == threads)?;
+        Some(Step::new(from, id.clone()))
+    };
+    let mut steps: Vec<Step> = step(0, "brute", 1).into_iter().chain(step(GRID_FROM, "grid-sap", 1)).collect();
+    let mut widths: Vec<u32> =
+        known.iter().map(AlgorithmId::threads).filter(|k| (2..=MOST_THREADS).contains(k)).collect();
+    widths.sort_unstable();
+    widths.dedup();
+    steps.extend(widths.into_iter().filter_map(|k| step(THREADS_FROM * k * k, "grid-sap", k)));
+    Tuning::from_steps(steps).map_err(|_| Error::NoAlgorithm)
+}
+
+/// Converts pairs to numbers, two each.
+pub(crate) fn flat(pairs: &Pairs, from_second: u32) -> Result<Vec<u32>, Error> {
+    let mut numbers = Vec::new();
+    let refused = |_| Error::OutOfMemory { what: "pairs", elements: pairs.len() };
+    numbers.try_reserve_exact(2 * pairs.len()).map_err(refused)?;
+    numbers.extend(pairs.iter().flat_map(|&(a, b)| [a, b - from_second]));
+    Ok(numbers)
+}
+
+/// Makes an array with two numbers a row.
+pub(crate) fn two_columns<'py, T: numpy::Element>(
+    py: Python<'py>,
+    numbers: Vec<T>,
+) -> PyResult<Bound<'py, PyArray2<T>>> {
+    let rows = Array2::from_shape_vec([numbers.len() / 2, 2], numbers);
+    rows.map(|rows| rows.into_pyarray(py)).map_err(|why| unusable(py, why.to_string()))
+}
+
+/// Runs a call on `objects` boxes, without the interpreter's lock. Checks for Ctrl-C before and after.
+pub(crate) fn search<'py>(
+    py: Python<'py>,
+    objects: usize,
+    search: Search<'_>,
+    error: impl FnOnce(Error) -> PyErr,
+) -> PyResult<Bound<'py, PyArray2<u32>>> {
+    py.check_signals()?;
+    let engine = idle(py, |idle| idle.engines.pop());
+    let (found, engine, decision) = py.detach(|| {
+        let mut engine = match engine.map_or_else(Engine::new, Ok) {
+            Ok(engine) => engine,
+            Err(why) => return (Err(why), None, None),
+        };
+        let found = engine.find(search);
+        let kept = objects <= MOST_BOXES_KEPT && engine.is_small();
+        if kept { (found, Some(engine), None) } else { (found, None, engine.decision()) }
+    });
+    let over = idle(py, |idle| {
+        idle.decision = decision;
+        idle.engines.extend(engine);
+        (idle.engines.len() > MOST_KEPT).then(|| idle.engines.remove(0))
+    });
+    if over.is_some() {
+        py.detach(|| drop(over));
+    }
+    py.check_signals()?;
+    two_columns(py, found.map_err(error)?)
+}

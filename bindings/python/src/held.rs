@@ -1,0 +1,160 @@
+//! What a class holds that searches and learns: behind a lock, made anew after a fork, saved at the end of a block.
+
+use crate::decision::PyDecision;
+use crate::error::{call, failed, with_cause};
+use crate::start::{self, Start};
+use crate::tuning::PyTuning;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use sapwise::Adaptive;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
+
+/// What searches with an [`Adaptive`].
+pub(crate) trait Searcher: Send + Sync + Sized {
+    /// The name of its class.
+    const CLASS: &'static str;
+
+    /// Makes it anew in a forked process, which has none of its threads.
+    ///
+    /// # Errors
+    /// In words.
+    fn forked(parent: &RwLock<Self>, adaptive: Adaptive, start: &Start) -> Result<Self, String>;
+
+    fn adaptive(&self) -> &Adaptive;
+}
+
+/// A searcher, until it is closed.
+pub(crate) struct Held<T: Searcher> {
+    start: Start,
+    state: Mutex<State<T>>,
+}
+
+/// Locked only by a thread with the interpreter's lock, and for an instant: no fork finds it locked.
+struct State<T> {
+    /// The process that made the searcher. Its threads are not in a forked one.
+    pid: u32,
+    /// `None` once it is closed. Only a thread without the interpreter's lock locks it.
+    searcher: Option<Arc<RwLock<T>>>,
+}
+
+impl<T> Drop for State<T> {
+    fn drop(&mut self) {
+        if self.pid != std::process::id() {
+            // Dropping it would wait for threads that are not in this process.
+            std::mem::forget(self.searcher.take());
+        }
+    }
+}
+
+impl<T: Searcher> Held<T> {
+    pub(crate) fn new(py: Python<'_>, start: Start, make: impl FnOnce(Adaptive, &Start) -> T) -> PyResult<Self> {
+        let searcher = make(start::adaptive(py, &start)?, &start);
+        let state = State { pid: std::process::id(), searcher: Some(Arc::new(RwLock::new(searcher))) };
+        Ok(Self { start, state: Mutex::new(state) })
+    }
+
+    pub(crate) fn start(&self) -> &Start {
+        &self.start
+    }
+
+    fn state(&self) -> MutexGuard<'_, State<T>> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Returns the searcher, made anew after a fork.
+    pub(crate) fn shared(&self, py: Python<'_>) -> PyResult<Arc<RwLock<T>>> {
+        let pid = std::process::id();
+        let (known, made_here) = {
+            let state = self.state();
+            (state.searcher.clone(), state.pid == pid)
+        };
+        let Some(known) = known else {
+            return Err(failed(py, format!("this {} is closed; make another one", T::CLASS)));
+        };
+        if made_here {
+            return Ok(known);
+        }
+        // After a fork this process has one thread.
+        let made = T::forked(&known, start::adaptive(py, &self.start)?, &self.start).map_err(|why| failed(py, why))?;
+        let made = Arc::new(RwLock::new(made));
+        let mut state = self.state();
+        std::mem::forget((known, state.searcher.replace(Arc::clone(&made))));
+        state.pid = pid;
+        Ok(made)
+    }
+
+    /// Runs `what` on the searcher, without the interpreter's lock, while nothing else uses it.
+    pub(crate) fn write<R: Send>(&self, py: Python<'_>, what: impl FnOnce(&mut T) -> R + Send) -> PyResult<R> {
+        let shared = self.shared(py)?;
+        Ok(py.detach(|| what(&mut shared.write().unwrap_or_else(PoisonError::into_inner))))
+    }
+
+    /// Runs `what` on the searcher, without the interpreter's lock, while nothing changes it.
+    pub(crate) fn read<R: Send>(&self, py: Python<'_>, what: impl FnOnce(&T) -> R + Send) -> PyResult<R> {
+        let shared = self.shared(py)?;
+        Ok(py.detach(|| what(&shared.read().unwrap_or_else(PoisonError::into_inner))))
+    }
+
+    pub(crate) fn last_decision(&self, py: Python<'_>) -> PyResult<Option<PyDecision>> {
+        self.read(py, |searcher| searcher.adaptive().last_decision().map(PyDecision::from))
+    }
+
+    pub(crate) fn tuning(&self, py: Python<'_>) -> PyResult<PyTuning> {
+        self.read(py, |searcher| PyTuning::from(searcher.adaptive().learned()))
+    }
+
+    pub(crate) fn setup<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let setup = self.read(py, |searcher| searcher.adaptive().setup().clone())?;
+        crate::tuning::setup(py, &setup)
+    }
+
+    pub(crate) fn save(&self, py: Python<'_>) -> PyResult<bool> {
+        let saved = self.read(py, |searcher| searcher.adaptive().save())?;
+        let saved = saved.map_err(|error| failed(py, with_cause(&error)))?;
+        if saved {
+            crate::engine::start_again(py);
+        }
+        Ok(saved)
+    }
+
+    pub(crate) fn close(&self, py: Python<'_>) {
+        let (searcher, foreign) = {
+            let mut state = self.state();
+            (state.searcher.take(), state.pid != std::process::id())
+        };
+        if foreign {
+            std::mem::forget(searcher);
+        } else {
+            py.detach(|| drop(searcher));
+        }
+    }
+
+    pub(crate) fn is_closed(&self) -> bool {
+        self.state().searcher.is_none()
+    }
+
+    /// Saves what was learned, if the start says so, and closes. What the block raised matters more than a cache that
+    /// can't be written: that is a warning.
+    pub(crate) fn exit(&self, py: Python<'_>) -> PyResult<bool> {
+        if !self.is_closed() {
+            let saved = if self.start.keeps { self.save(py).err() } else { None };
+            self.close(py);
+            if let Some(why) = saved {
+                call(py, "sapwise._errors", "warn_unsaved", (why.value(py).to_string(),))?;
+            }
+        }
+        Ok(false)
+    }
+
+    /// Returns the text of `repr`.
+    pub(crate) fn text(&self, py: Python<'_>, unused: &str) -> PyResult<String> {
+        if self.is_closed() {
+            return Ok(format!("<sapwise.{}, closed>", T::CLASS));
+        }
+        let last = self.last_decision(py)?;
+        Ok(last.map_or_else(
+            || format!("<sapwise.{}, {unused}>", T::CLASS),
+            |decision| format!("<sapwise.{}: {}>", T::CLASS, decision.sentence),
+        ))
+    }
+}
