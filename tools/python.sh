@@ -77,13 +77,13 @@ bench)
     ;;
 examples)
     wheel
-    fresh pandas matplotlib trimesh rtree scipy
+    fresh pandas matplotlib trimesh rtree scipy mujoco
     # For a mesh that it ships: nothing of it is imported, nor what it depends on.
     pip "$folder/fresh" --no-deps pyvista
     mkdir -p "$folder/examples"
     cd "$folder"
     fresh/bin/python "$root/bindings/python/examples/study.py" "$root/datasets" examples/study.png
-    fresh/bin/python "$root/bindings/python/examples/trimesh_scene.py"
+    for example in clashes particles trimesh_scene mujoco_geoms; do fresh/bin/python "$root/bindings/python/examples/$example.py"; done
     ;;
 index)
     wheel

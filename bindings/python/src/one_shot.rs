@@ -45,10 +45,10 @@ impl Wishes<'_> {
         Ok(Cow::Owned(py.detach(|| boxes.iter().map(|aabb| aabb.swept(by)).collect())))
     }
 
-    /// Returns the corners of both members of a pair if the answer for 32-bit boxes may have pairs too many.
+    /// Returns the corners of both members of a pair if rounding to 32 bits may have made pairs.
     fn exactly<'b>(&self, corners: [Corners<'b>; 2]) -> Option<Exactly<'b>> {
         let wide = corners.iter().any(|of| matches!(of, Corners::Wide(_)));
-        (wide || self.margin > 0.0).then_some(Exactly { corners, margin: self.margin })
+        wide.then_some(Exactly { corners, margin: self.margin })
     }
 
     /// Returns the search of one list by these wishes. Positions in the answer are those of `boxes`.

@@ -158,7 +158,8 @@ impl PySpace {
     /// Returns
     /// -------
     /// ndarray, shape (n,), uint64
-    ///     Their handles. None is 0, and no other body of the space gets one of them.
+    ///     Their handles. None is 0, and no other body of the space gets one of them. The upper 32 bits are a small
+    ///     number that no other body has at the time: ``handles >> 32`` are positions for arrays of your own.
     ///
     /// Raises
     /// ------
