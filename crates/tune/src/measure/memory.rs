@@ -10,6 +10,7 @@ use sysinfo::{ProcessRefreshKind, ProcessesToUpdate, System};
 use super::samples::Plan;
 use super::{Options, cache_sizes, filled, missing, pool};
 use crate::hardware::{Parameter, ParameterId};
+#[cfg(target_arch = "x86_64")]
 use sapwise::algorithm::SimdLevel;
 
 /// Bytes that STREAM counts for one element of triad: two read, one written, without the line that is fetched before
