@@ -31,6 +31,25 @@ fn bodies_that_are_not_set_rest_and_wake() {
 }
 
 #[test]
+fn update_beyond_the_limit_is_an_error() {
+    let mut space = Space::new();
+    let cube = Aabb::cube([0.0; 3], 1.0);
+    let handles = space.insert_all(&[cube; 2], Body::default()).unwrap();
+    space.set_limit(Some(1));
+    space.update().unwrap();
+    space.insert_all(&[cube; 3], Body::default()).unwrap();
+    for _ in 0..2 {
+        assert_eq!(space.update(), Err(Error::TooManyPairs { limit: 1 }));
+        assert!(space.begun().is_empty() && space.ended().is_empty());
+    }
+    assert_eq!(space.clone().update(), Err(Error::TooManyPairs { limit: 1 }));
+    space.remove(handles[0]).unwrap();
+    space.set_limit(None);
+    space.update().unwrap();
+    assert_eq!((space.pairs().len(), space.begun().len(), space.ended().len()), (6, 6, 1));
+}
+
+#[test]
 fn fixed_bodies_rest_at_once_but_not_right_after_they_were_set() {
     let mut space = Space::new();
     let boxes: Vec<Aabb> = (0..400).map(|k| Aabb::cube([k as f32, 0.0, 0.0], 0.4)).collect();

@@ -27,8 +27,8 @@ impl Space {
     /// Finds all pairs, and which began and ended since the previous update.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`] and [`Error::Unavailable`]. Then no pair has begun or ended, the pairs of active bodies
-    /// are missing, and the next update compares with the last one that succeeded.
+    /// [`Error::TooManyPairs`], [`Error::OutOfMemory`] and [`Error::Unavailable`]. Then no pair has begun or ended, the
+    /// pairs of active bodies are missing, and the next update compares with the last one that succeeded.
     pub fn update(&mut self) -> Result<(), Error> {
         self.update += 1;
         self.tree.take();
