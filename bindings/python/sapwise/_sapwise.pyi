@@ -59,7 +59,7 @@ def measure_hardware(
     quick: bool, progress: Callable[[int, int, str], object] | None
 ) -> tuple[dict[str, str], list[dict[str, Any]]]: ...
 def restored_space(
-    snapshot: bytes, tuning: Tuning, threads: int | None, learning: bool, exploring: bool
+    snapshot: bytes, tuning: Tuning, threads: int | None, learning: bool, exploring: bool, limit: int | None
 ) -> Space: ...
 
 @final
@@ -192,6 +192,7 @@ class Space(View):
         threads: int | None = None,
         learning: bool = True,
         exploring: bool = True,
+        limit: int | None = None,
     ) -> Space: ...
     def insert(
         self,

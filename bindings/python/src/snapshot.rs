@@ -16,8 +16,8 @@ const HEAD: &[u8] = b"sapwise space 1\n";
 pub(crate) fn reduced<'py>(py: Python<'py>, held: &Held<Space>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
     let written = held.read(py, |space| postcard::to_extend(space, HEAD.to_vec()))?;
     let bytes = written.map_err(|why| failed(py, format!("no snapshot of the space: {why}")))?;
-    let Start { threads, learning, exploring, .. } = *held.start();
-    let arguments = (PyBytes::new(py, &bytes), held.tuning(py)?, threads, learning, exploring);
+    let Start { threads, learning, exploring, limit, .. } = *held.start();
+    let arguments = (PyBytes::new(py, &bytes), held.tuning(py)?, threads, learning, exploring, limit);
     Ok((py.import("sapwise._sapwise")?.getattr("restored_space")?, arguments.into_pyobject(py)?.into_any()))
 }
 
@@ -30,6 +30,7 @@ pub(crate) fn restored_space<'py>(
     threads: Option<u32>,
     learning: bool,
     exploring: bool,
+    limit: Option<usize>,
 ) -> PyResult<Bound<'py, PySpace>> {
     let Some(snapshot) = snapshot.strip_prefix(HEAD) else {
         return Err(unusable(py, "this is no snapshot of a Space of this version; pickle the space again"));
@@ -37,10 +38,11 @@ pub(crate) fn restored_space<'py>(
     let restored: Space = py
         .detach(|| postcard::from_bytes(snapshot))
         .map_err(|why| unusable(py, format!("the snapshot is damaged: {why}; pickle the space again")))?;
-    let start = Start { threads, learning, exploring, ..Start::new(None, false, false, Some(tuning), None)? };
-    PySpace::made(py, start, |adaptive, _| {
+    let start = Start { threads, learning, exploring, limit, ..Start::new(None, false, false, Some(tuning), None)? };
+    let made = PySpace::initial(py, start, |adaptive| {
         let mut space = Space::with(adaptive);
         space.clone_from(&restored);
         space
-    })
+    })?;
+    Bound::new(py, made)
 }

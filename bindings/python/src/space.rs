@@ -44,8 +44,8 @@ impl Searcher for Space {
 ///
 /// Parameters
 /// ----------
-/// cache, measure, background, tuning, algorithm, threads, learning, exploring
-///     As in ``BroadPhase``.
+/// cache, measure, background, tuning, algorithm, threads, learning, exploring, limit
+///     As in ``BroadPhase``. Pairs with bodies that rest do not count for the limit.
 ///
 /// Raises
 /// ------
@@ -78,20 +78,17 @@ pub(crate) struct PySpace {
 
 impl PySpace {
     /// Makes a space with these arguments.
-    pub(crate) fn made<'py>(
-        py: Python<'py>,
-        start: Start,
-        make: impl FnOnce(Adaptive, &Start) -> Space,
-    ) -> PyResult<Bound<'py, Self>> {
-        Bound::new(py, Self::initial(py, start, make)?)
-    }
-
-    fn initial(
+    pub(crate) fn initial(
         py: Python<'_>,
         start: Start,
-        make: impl FnOnce(Adaptive, &Start) -> Space,
+        make: impl FnOnce(Adaptive) -> Space,
     ) -> PyResult<PyClassInitializer<Self>> {
-        let held = Arc::new(Held::new(py, start, make)?);
+        let held = Held::new(py, start, |adaptive, start| {
+            let mut space = make(adaptive);
+            space.set_limit(start.most_pairs());
+            space
+        })?;
+        let held = Arc::new(held);
         let view = PyView { held: Arc::clone(&held), by: None };
         Ok(PyClassInitializer::from(view).add_subclass(Self { held }))
     }
@@ -128,7 +125,7 @@ impl PySpace {
     #[new]
     #[pyo3(signature = (
         *, cache=None, measure=true, background=true, tuning=None, algorithm=None, threads=None, learning=true,
-        exploring=true,
+        exploring=true, limit=None,
     ))]
     #[expect(clippy::too_many_arguments, reason = "they have names in Python")]
     fn new(
@@ -141,9 +138,10 @@ impl PySpace {
         #[pyo3(from_py_with = start::threads)] threads: Option<u32>,
         learning: bool,
         exploring: bool,
+        #[pyo3(from_py_with = start::limit)] limit: Option<usize>,
     ) -> PyResult<PyClassInitializer<Self>> {
         let start = Start::new(cache, measure, background, tuning, algorithm)?;
-        Self::initial(py, Start { threads, learning, exploring, ..start }, |adaptive, _| Space::with(adaptive))
+        Self::initial(py, Start { threads, learning, exploring, limit, ..start }, Space::with)
     }
 
     /// Insert a body for each box.
@@ -274,8 +272,8 @@ impl PySpace {
     ///
     /// Raises
     /// ------
-    /// MemoryError, SapwiseError
-    ///     No memory, or no algorithm can run. The next update compares with the last one that succeeded.
+    /// TooManyPairsError, MemoryError, SapwiseError
+    ///     More pairs than ``limit``, no memory, or no algorithm can run. The next update compares with the last one that succeeded.
     fn update(&self, py: Python<'_>) -> PyResult<()> {
         py.check_signals()?;
         self.change(py, &[], &[], Space::update)?;

@@ -78,6 +78,11 @@ impl Start {
     pub(crate) fn pairs(&self) -> Pairs {
         pairs(order(self.ordered), self.limit)
     }
+
+    /// Returns the caller's limit, or the default limit.
+    pub(crate) fn most_pairs(&self) -> Option<usize> {
+        self.limit.or_else(crate::memory::most_pairs)
+    }
 }
 
 /// Makes an empty list of pairs. Without a limit, free memory limits it.

@@ -2,6 +2,7 @@
 
 import json
 import os
+import pickle
 import sys
 
 import numpy as np
@@ -61,6 +62,7 @@ def test_json_goes_there_and_back(tuning):
     text = tuning.to_json()
     assert json.loads(text)["schema"] == "tuning/3"
     assert sapwise.Tuning.from_json(text).to_json() == text
+    assert pickle.loads(pickle.dumps(tuning)).to_json() == text
     for damaged in ("{", '{"schema": "report/3"}', text.replace('"revision"', '"version"', 1)):
         with pytest.raises(sapwise.InputError):
             sapwise.Tuning.from_json(damaged)

@@ -277,6 +277,23 @@ def test_it_saves_when_the_block_ends(tmp_path):
     assert sapwise.Space(cache=tmp_path, measure=False, background=False).setup["origin"] == "cached"
 
 
+def test_a_crowd_beyond_the_limit():
+    with quiet(limit=1000) as space:
+        one, *_ = space.insert(np.zeros((40, 6)))
+        space.update()
+        space.insert(np.zeros((10, 6)))
+        for of in (space, pickle.loads(pickle.dumps(space))):
+            with pytest.raises(sapwise.TooManyPairsError, match="limit of 1000"):
+                of.update()
+        space.remove(space.handles()[40:])
+        space.update()
+        assert len(space.pairs()) == 780 and len(space.begun()) == len(space.ended()) == 0
+    # 2e11 pairs, 3.2 TB.
+    with quiet() as space, pytest.raises((sapwise.TooManyPairsError, MemoryError)):
+        space.insert(np.zeros((632_456, 6), np.float32))
+        space.update()
+
+
 def test_what_can_not_be_changes_nothing():
     with quiet() as space:
         handles = space.insert(cubes(3))
