@@ -1,7 +1,7 @@
 """The figures of the Python package, interleaved in one run: `tools/python.sh bench`.
 
-Overhead: wall clock of `sapwise.pairs` less that of the library's own call on the same boxes, in a process of Rust
-beside this one; the two take turns.
+Overhead: wall clock of `sapwise.pairs`, and of a `Space` in which all boxes move, with the array of its pairs, less
+that of the library's own calls on the same boxes, in a process of Rust beside this one; the two take turns.
 
 Other libraries: the pairs of boxes that are there as an array of NumPy. What each is timed with: making its structure
 and asking for all pairs. Of FCL the objects are there already, with the Python callback that counts the pairs: what is
@@ -9,6 +9,7 @@ timed is `update` and `collide`. SciPy's tree takes the centres, with the larges
 drops what does not overlap.
 """
 
+import itertools
 import os
 import subprocess
 import sys
@@ -52,23 +53,40 @@ def text(samples_ns):
 
 def overhead(objects, visits, frames):
     (boxes,), path = scene(objects)
-    found = sapwise.pairs(boxes)
+    sapwise.pairs(boxes)
     algorithm = sapwise.last_decision().algorithm
-    command = [RUST, "serve", str(path), algorithm]
+    compare("pairs", lambda: sapwise.pairs(boxes), [RUST, "serve", str(path), algorithm], objects, visits, frames)
+
+
+def overhead_of_space(objects, visits, frames):
+    turns, path = scene(objects, 2)
+    space = sapwise.Space(algorithm="pair-cache@cpu1")
+    handles = space.insert(turns[0])
+    order = itertools.cycle([turns[1], turns[0]])
+
+    def frame():
+        space.set(handles, next(order))
+        space.update()
+        return space.pairs()
+
+    compare("Space", frame, [RUST, "space", str(path), "pair-cache@cpu1"], objects, visits, frames)
+
+
+def compare(name, call, command, objects, visits, frames):
     serve = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     python, rust = [], []
     for visit in range(visits + 1):
         serve.stdin.write(f"{frames + 1}\n")
         serve.stdin.flush()
         *times, count = map(int, serve.stdout.readline().split())
-        assert count == len(found)
         here = []
         for _ in range(frames + 1):
             began = time.perf_counter_ns()
-            answer = sapwise.pairs(boxes)
+            answer = call()
             here.append(time.perf_counter_ns() - began)
-            assert len(answer) == count
+            found = len(answer)
             del answer
+        assert found == count
         # Drops the first frame of a visit and the first visit, which are cold.
         if visit > 0:
             python.append(np.median(here[1:]))
@@ -78,7 +96,7 @@ def overhead(objects, visits, frames):
     more = np.array(python) - np.array(rust)
     low, median, high = quartiles(more / 1e3)
     low_share, share, high_share = 100 * quartiles(more / rust)
-    print(f"{objects} boxes, {len(found)} pairs, {algorithm}, {visits} visits of {frames} frames each:")
+    print(f"{name}, {objects} boxes, {count} pairs, {command[-1]}, {visits} visits of {frames} frames each:")
     print(f"  Rust {text(rust)}, Python {text(python)}")
     print(f"  overhead {median:.1f} µs ({low:.1f} to {high:.1f}), {share:.2f} % ({low_share:.2f} to {high_share:.2f})")
 
@@ -162,7 +180,8 @@ def imports():
 
 warnings.simplefilter("ignore", sapwise.ConversionWarning)
 imports()
-overhead(1000, 200, 50)
-overhead(1_000_000, 12, 3)
+for measured in (overhead, overhead_of_space):
+    measured(1000, 200, 50)
+    measured(1_000_000, 12, 3)
 others(10_000, 31)
 others(100_000, 9)

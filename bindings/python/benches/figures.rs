@@ -2,9 +2,10 @@
 //!
 //! `figures scene uniform OBJECTS SEED FRAMES FILE` writes the frames of a scenario from the second on as 32-bit
 //! floats. `figures serve FILE ALGORITHM` answers each number on a line of the standard input with the times of as many
-//! frames, in nanoseconds, and the number of pairs.
+//! frames, in nanoseconds, and the number of pairs; `figures space FILE ALGORITHM` does so for a space that is set to
+//! two frames of the file in turns.
 
-use sapwise::{Aabb, Adaptive, BroadPhase, PairOrder, Pairs, Registry};
+use sapwise::{Aabb, Adaptive, Body, BroadPhase, PairOrder, Pairs, Registry, Space};
 use sapwise_scenes::Scenario;
 use std::error::Error;
 use std::io::{BufRead, Write, stdin, stdout};
@@ -25,25 +26,50 @@ fn main() -> Result<(), Box<dyn Error>> {
             std::fs::write(file, bytes)?;
             Ok(())
         }
-        ["serve", file, algorithm] => serve(&std::fs::read(file)?, algorithm),
-        _ => Err("usage: figures scene SCENARIO OBJECTS SEED FRAMES FILE | figures serve FILE ALGORITHM".into()),
+        ["serve", file, algorithm] => serve(&boxes(file)?, algorithm),
+        ["space", file, algorithm] => space(&boxes(file)?, algorithm),
+        _ => Err("usage: figures scene SCENARIO OBJECTS SEED FRAMES FILE | figures serve|space FILE ALGORITHM".into()),
     }
 }
 
-/// What `sapwise.pairs` calls, on the same boxes.
-fn serve(bytes: &[u8], algorithm: &str) -> Result<(), Box<dyn Error>> {
+fn boxes(file: &str) -> Result<Vec<Aabb>, Box<dyn Error>> {
+    let bytes = std::fs::read(file)?;
     let floats: Vec<f32> = bytes.as_chunks().0.iter().map(|&b| f32::from_le_bytes(b)).collect();
-    let boxes: Vec<Aabb> =
-        floats.as_chunks().0.iter().map(|&[a, b, c, d, e, f]| Aabb::new([a, b, c], [d, e, f])).collect();
+    Ok(floats.as_chunks().0.iter().map(|&[a, b, c, d, e, f]| Aabb::new([a, b, c], [d, e, f])).collect())
+}
+
+/// What `sapwise.pairs` calls, on the same boxes.
+fn serve(boxes: &[Aabb], algorithm: &str) -> Result<(), Box<dyn Error>> {
     let mut broad_phase = Adaptive::only(algorithm.parse()?, &Registry::new())?;
     let mut pairs = Pairs::with_order(PairOrder::Canonical);
+    answer(|| {
+        broad_phase.find_pairs(boxes, &mut pairs)?;
+        Ok(pairs.len())
+    })
+}
+
+/// What `sapwise.Space` calls, on the same boxes.
+fn space(boxes: &[Aabb], algorithm: &str) -> Result<(), Box<dyn Error>> {
+    let (even, odd) = boxes.split_at(boxes.len() / 2);
+    let mut space = Space::with(Adaptive::only(algorithm.parse()?, &Registry::new())?);
+    let handles = space.insert_all(even, Body::default())?;
+    let mut turns = [odd, even].into_iter().cycle();
+    answer(|| {
+        space.set_all(&handles, turns.next().unwrap_or(even))?;
+        space.update()?;
+        Ok(space.pairs().len())
+    })
+}
+
+fn answer(mut frame: impl FnMut() -> Result<usize, sapwise::Error>) -> Result<(), Box<dyn Error>> {
     for line in stdin().lock().lines() {
+        let mut pairs = 0;
         for _ in 0..line?.trim().parse::<usize>()? {
             let began = Instant::now();
-            broad_phase.find_pairs(&boxes, &mut pairs)?;
+            pairs = frame()?;
             print!("{} ", began.elapsed().as_nanos());
         }
-        println!("{}", pairs.len());
+        println!("{pairs}");
         stdout().flush()?;
     }
     Ok(())
