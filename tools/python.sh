@@ -3,6 +3,8 @@
 #
 #   tools/python.sh            # formatting, clippy, wheel, tests
 #   tools/python.sh wheel      # builds the wheel and tells where it is
+#   tools/python.sh sdist      # builds the source distribution, and installs it
+#   tools/python.sh aarch64    # builds the wheel for 64-bit ARM with zig, and uses it in QEMU
 #   tools/python.sh bench      # the figures: overhead, other libraries, sizes, time of the import
 #   tools/python.sh examples   # runs bindings/python/examples/ and writes their pictures to target/python/examples/
 #   tools/python.sh index      # writes the index of docs/python.md from the docstrings
@@ -67,6 +69,54 @@ test)
     pip "$folder/fresh" pandas pandas-stubs mypy
     run "$tests"
     ;;
+sdist)
+    rm -rf "$folder/sdist"
+    "$folder/tools/bin/maturin" sdist --quiet --manifest-path bindings/python/Cargo.toml --out "$folder/sdist"
+    wheel=$(echo "$folder"/sdist/*.tar.gz)
+    fresh
+    cd "$folder"
+    fresh/bin/python -c 'import numpy, sapwise; assert len(sapwise.pairs(numpy.zeros((3, 6)))) == 3'
+    echo "$wheel"
+    ;;
+aarch64)
+    target=aarch64-unknown-linux-gnu
+    [ -d "$(rustc --print sysroot)/lib/rustlib/$target/lib" ] || rustup target add $target
+    command -v qemu-aarch64 >/dev/null || { apt-get update -q; apt-get install -qy --no-install-recommends qemu-user; }
+    pip "$folder/tools" ziglang
+    rm -rf "$folder/arm"
+    PATH=$folder/tools/bin:$PATH maturin build --quiet --release --locked --strip --manifest-path bindings/python/Cargo.toml \
+        --target $target --zig --out "$folder/arm"
+    # Debian's Python for that processor, in a folder of its own, with the wheels beside it.
+    cd "$folder/arm"
+    mkdir -p state/lists/partial cache/archives/partial root site
+    touch status
+    foreign() {
+        apt-get -q -o Dir::State="$PWD/state" -o Dir::State::status="$PWD/status" -o Dir::Cache="$PWD/cache" \
+            -o APT::Sandbox::User=root -o APT::Architecture=arm64 -o APT::Architectures=arm64 "$@"
+    }
+    foreign update
+    minor=$(foreign show python3 | sed -n 's/^Version: 3\.\([0-9]*\).*/\1/p' | head -1)
+    (cd cache && foreign download "python3.$minor-minimal" "libpython3.$minor-minimal" "libpython3.$minor-stdlib" libc6 libgcc-s1 \
+        libexpat1 zlib1g libffi8 libstdc++6 liblzma5 libbz2-1.0)
+    for package in cache/*.deb; do dpkg-deb -x "$package" root; done
+    "$folder/tools/bin/python" -m pip download --quiet --no-deps --only-binary=:all: --python-version "3.$minor" \
+        --platform manylinux2014_aarch64 --platform manylinux_2_27_aarch64 --platform manylinux_2_28_aarch64 --dest . numpy
+    for wheel in *.whl; do "$python" -m zipfile -e "$wheel" site; done
+    qemu-aarch64 -L root -E PYTHONPATH="$PWD/site" -E PYTHONHOME="$PWD/root/usr" "root/usr/bin/python3.$minor" - <<'END'
+import pickle, platform
+import numpy as np, sapwise
+low = np.random.default_rng(1).uniform(0, 20, (3000, 3)).astype(np.float32)
+boxes = np.concatenate([low, low + 1], axis=1)
+known = [(i, j) for i in range(3000) for j in np.flatnonzero((np.abs(low[i + 1 :] - low[i]) < 1).all(axis=1)) + i + 1]
+assert len(known) > 1000 and np.array_equal(sapwise.pairs(boxes), known)
+with sapwise.Space(cache=False, measure=False) as space:
+    handles = space.insert(boxes)
+    space.update()
+    assert len(pickle.loads(pickle.dumps(space)).pairs()) == len(known)
+print("python:", platform.machine(), sapwise.last_decision())
+END
+    ls -l sapwise-*.whl
+    ;;
 bench)
     wheel
     fresh scipy rtree python-fcl trimesh
@@ -90,5 +140,5 @@ index)
     fresh
     "$folder/fresh/bin/python" tools/python_index.py docs/python.md
     ;;
-*) fail "usage: tools/python.sh [test|wheel|bench|examples|index]" ;;
+*) fail "usage: tools/python.sh [test|wheel|sdist|aarch64|bench|examples|index]" ;;
 esac
