@@ -71,7 +71,7 @@ test)
     ;;
 sdist)
     rm -rf "$folder/sdist"
-    "$folder/tools/bin/maturin" sdist --quiet --manifest-path bindings/python/Cargo.toml --out "$folder/sdist"
+    "$folder/tools/bin/maturin" sdist --manifest-path bindings/python/Cargo.toml --out "$folder/sdist"
     wheel=$(echo "$folder"/sdist/*.tar.gz)
     fresh
     cd "$folder"

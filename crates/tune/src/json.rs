@@ -30,7 +30,7 @@ pub fn model(text: &str) -> Result<Model, Error> {
 }
 
 /// The text of the built-in model.
-pub(crate) const BUILT_IN: &str = include_str!("../../../models/default.json");
+pub(crate) const BUILT_IN: &str = include_str!("../default.json");
 
 impl Model {
     /// The model that comes with this library: `models/default.json`, whose card is `models/README.md`.
