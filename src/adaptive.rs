@@ -1,20 +1,17 @@
 //! The in-line module: the cheapest algorithm for this frame, chosen before it runs.
 
+mod breaker;
 mod decision;
-mod estimates;
-mod frame_batch;
+mod epoch;
 mod instances;
-mod learner;
 mod load_tracker;
-mod motion_watch;
-mod passed;
+mod pace;
+mod part;
 mod policy;
 mod runner;
 mod setup;
-mod shelter;
-mod switching;
-mod throttle;
-mod trials;
+mod trial;
+mod wait;
 mod warming;
 
 use crate::aabb::Aabb;
@@ -52,12 +49,14 @@ impl Adaptive {
     /// An adaptive broad phase over those algorithms of `tuning` that `registry` can make.
     ///
     /// An algorithm whose cost was found for another revision is left out, and so is one with more threads than the
-    /// registry lists: its cost says nothing about this build or this machine.
+    /// registry lists: its cost says nothing about this build or this machine. So are those that
+    /// [`Tuning::for_running`] leaves out.
     ///
     /// # Errors
     /// [`Error::Unavailable`] or [`Error::UnknownAlgorithm`] when none can be made, [`Error::NoAlgorithm`] when none
     /// is named.
     pub fn new(tuning: Tuning, registry: &Registry) -> Result<Self, Error> {
+        let tuning = tuning.for_running();
         let mut made = Instances::of(&tuning, registry);
         made.failure().map_or_else(|| Ok(Self::with(tuning, made)), Err)
     }
@@ -88,14 +87,10 @@ impl Adaptive {
         self.runner.policy.set_learning(learns && clock::TICKS);
     }
 
-    /// Whether now and then another algorithm than the cheapest is tried, to learn what that one costs: in two
-    /// frames, in eight where it goes on with what the cheapest keeps, on another number of threads, or in up to 128
-    /// where it has to make first what it keeps, until they have cost two frames of the cheapest more than it would
-    /// have. Only where what the trial is expected to tell may save more in the next 300 frames than it costs. What
-    /// trials and their decisions have cost is measured, and no other is made until that is no more than 0.5 % of the
-    /// time of the frames and four frames, unless it is expected to save 17 times its price and no more than eight
-    /// frames are owed; a scene that suddenly is larger than all before counts as one that begins. On unless it is
-    /// turned off; without [learning](Self::set_learning) it does nothing.
+    /// Whether trials run: now and then another algorithm than the cheapest runs for 2 to 16 frames, to learn what it
+    /// costs. A trial begins if it is expected to save more in the next 300 frames than it costs. Trials may cost
+    /// 0.5 % of the time, and eight frames in advance. On unless turned off; without [learning](Self::set_learning)
+    /// none runs.
     pub fn set_exploring(&mut self, explores: bool) {
         self.runner.policy.set_exploring(explores);
     }
@@ -112,8 +107,10 @@ impl Adaptive {
     #[must_use]
     pub fn learned(&self) -> Tuning {
         let tuning = self.runner.policy.tuning();
-        let Some(learner) = self.runner.policy.learned() else { return tuning.clone() };
-        let costs = learner.lasting(&tuning.costs);
+        if !self.runner.policy.has_learned() {
+            return tuning.clone();
+        }
+        let costs = self.runner.policy.learned_costs();
         let load = self.runner.tracker.load();
         let like = |quarter: u32| {
             let objects = 10.0_f64.powf(f64::from(quarter) / 4.0).round() as u32;

@@ -1,12 +1,11 @@
 #!/usr/bin/env bash
-# Records the time of every algorithm in each frame of some scenes on this machine. A test replays such traces through
-# the adaptive choice, with a counter as its clock (src/adaptive/tests/traces.rs): `TRACES=DIR cargo test -p sapwise
-# --features model traces -- --nocapture` replays those of DIR instead of datasets/traces.
+# Records the time of every algorithm in each frame of some scenes on this machine, for datasets/traces/HOST. A test
+# replays them through the adaptive choice, with a counter as its clock: src/adaptive/tests/traces.rs.
 #
 #     tools/traces.sh DIR [SEED]
 #
 # Keeps the numbers of objects and pairs and the times of what `sapwise run --trace` writes. Nothing else should run
-# meanwhile; takes half a minute.
+# meanwhile; takes two minutes. SAPWISE and STREAMS name binaries that were built elsewhere.
 set -euo pipefail
 folder=${1:?usage: tools/traces.sh DIR [SEED]}
 seed=${2:-1}
@@ -20,12 +19,18 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 "$sapwise" predict --no-gpus --out "$work/tuning.json" >/dev/null
 
-# record SCENARIO OBJECTS SUFFIX OPTION...: one trace, named after the first three.
+streams=${STREAMS:-}
+[ -n "$streams" ] || {
+    cargo build --quiet --release -p sapwise-scenes --example streams
+    streams=${CARGO_TARGET_DIR:-target}/release/examples/streams
+}
+"$streams" "$work" >/dev/null
+
+# record NAME SCENE OPTION...: one trace.
 record() {
-    local scenario=$1 objects=$2 more=$3
-    shift 3
-    "$sapwise" run "$scenario" --objects "$objects" "$@" --seed "$seed" --repeats 1 --no-gpus \
-        --tuning "$work/tuning.json" --trace "$work/trace.csv" >/dev/null
+    local name=$1
+    shift
+    "$sapwise" run "$@" --repeats 1 --no-gpus --tuning "$work/tuning.json" --trace "$work/trace.csv" >/dev/null
     awk -F, 'NR == 1 { for (k = 1; k <= NF; k++) if ($k ~ /@|^objects$|^pairs$/) kept[++n] = k }
         {
             for (k = 1; k <= n; k++) {
@@ -34,14 +39,22 @@ record() {
                 printf "%s%s", cell, (k < n ? "," : "\n")
             }
         }' \
-        "$work/trace.csv" >"$folder/$scenario-$objects-$seed$more.csv"
+        "$work/trace.csv" >"$folder/$name.csv"
+}
+
+# scene SCENARIO OBJECTS SUFFIX OPTION...
+scene() {
+    local scenario=$1 objects=$2 suffix=$3
+    shift 3
+    record "$scenario-$objects-$seed$suffix" "$scenario" --objects "$objects" --seed "$seed" --frames 600 "$@"
 }
 
 for scenario in uniform fast clustered slab mixed resting brownian free-fall gravity; do
-    record $scenario 3000 "" --frames 600
-    record $scenario 3000 -swing --frames 600 --swing 50
+    scene $scenario 3000 ""
+    scene $scenario 3000 -swing --swing 50
 done
-record uniform 800 "" --frames 600
-record fragmentation 20000 "" --frames 600
-record fragmentation 2000 "" --frames 600
-record clustered 20000 -swing --frames 600 --swing 50
+scene uniform 800 ""
+scene fragmentation 20000 ""
+scene fragmentation 2000 ""
+scene clustered 20000 -swing --swing 50
+for stream in level fight pooled; do record "$stream-3000-1" "$work/$stream.npy"; done

@@ -1,55 +1,64 @@
-//! The load of the next frame: from a sample now and then, from the frame before in between; and when to decide by it.
+//! The load of the next frame: from a sample now and then, scaled from the last one in between.
 
-use super::motion_watch::MotionWatch;
-use super::passed::Passed;
-use super::throttle::{DecisionThrottle, SHARE_OF_DRIFT, drift};
+use super::epoch::Epoch;
+use super::pace::{Pace, SHARE_OF_DRIFT, drift};
 use crate::aabb::Aabb;
 use crate::clock::Instant;
 #[cfg(test)]
 use crate::clock::counted;
-use crate::load::{FramePlan, Load};
+use crate::load::{Displacement, FramePlan, Load, Motion, is_same_pace};
 
-/// Share of the frames' time that samples may take where the number of objects holds still. With [`SHARE_OF_DRIFT`] a
-/// scene that doubles is sampled when 45 times the sample's cost has passed, one that grows by a sixteenth after 310
-/// times.
-const SHARE: f64 = 0.002;
+/// Share of the frames' time that samples may take, and that looks at the motion may take.
+const SAMPLE_SHARE: f64 = 0.002;
+const LOOK_SHARE: f64 = 0.002;
 
-/// A sample that the system interrupts looks dear. Taken at its word it would put off the next one for seconds of
-/// frames, over which a change of the scene goes unseen.
+/// A sample or a look that the system interrupts would put off the next one for seconds: it counts at most this many
+/// times the previous one.
 const COST_RISES: f64 = 2.0;
 
-/// Samples are at least this many frames apart where nothing drifts: what `moved` tells changes slowly.
+/// Frames between two samples at least, unless the number of objects drifts by this much.
 const SAMPLE_EVERY: u32 = 32;
+const DRIFTED: f64 = 1.0 / 16.0;
 
-/// Keeps the estimate of the load up to date.
+/// Motion shows in two consecutive frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Watch {
+    #[default]
+    Resting,
+    /// Remember the boxes of this frame once it has run.
+    Due,
+    /// Compare the boxes of the next frame with the remembered ones.
+    Watching,
+}
+
+/// Keeps the load and the motion up to date.
 // A frame without a decision looks at what stands first alone: see `Runner`.
 #[repr(C)]
 #[derive(Debug, Clone, Default)]
 pub(super) struct LoadTracker {
-    throttle: DecisionThrottle,
-    /// The next frame is to show how far boxes move. Stands here, for a frame without a decision does not ask
-    /// `motion`, which lies in other lines of memory.
-    watching: bool,
+    pub(super) pace: Pace,
+    watch: Watch,
     load: Load,
-    /// What was worked out about the next frame.
+    /// What the last sample tells the algorithm about the frame that follows.
     plan: FramePlan,
-    /// Objects when the load was sampled, and frames and their time since.
-    sampled: u32,
+    /// Objects at the last sample, frames and nanoseconds since; nanoseconds of a sample.
+    sampled: Option<u32>,
     age: u32,
-    passed_ns: f64,
-    /// What a sample takes: the last one, but at most `COST_RISES` times what the one before was taken to be.
+    since_sample_ns: f64,
     sample_ns: f64,
-    /// What the sample of the last decision took, where it had one.
-    sampled_ns: f64,
-    motion: MotionWatch,
-    /// Objects and pairs of the frame before.
-    before: Option<(u32, u64)>,
+    /// The last motion that was found, nanoseconds since, and nanoseconds of a look.
+    motion: Option<Motion>,
+    since_look_ns: f64,
+    look_ns: f64,
+    displacement: Displacement,
+    /// A frame has run since the last failure.
+    knows_pairs: bool,
 }
 
 impl LoadTracker {
-    /// How far the boxes move in a frame, in edges, where that was found out.
+    /// How far boxes move in a frame, in mean edges, if known.
     pub(super) fn moved(&self) -> Option<f64> {
-        self.motion.motion().map(|m| m.moved)
+        self.motion.map(|motion| motion.moved)
     }
 
     /// The load that was estimated last.
@@ -57,46 +66,110 @@ impl LoadTracker {
         self.load
     }
 
-    /// What was worked out about the frame that is to run.
     pub(super) fn plan(&self) -> &FramePlan {
         &self.plan
     }
 
-    /// Whether the next frame is to be decided on again.
-    pub(super) fn is_due(&self, boxes: &[Aabb]) -> bool {
-        self.throttle.is_due(count(boxes))
+    /// Sets the load to that of a first frame, of which only the number of boxes is known.
+    pub(super) fn begin(&mut self, boxes: &[Aabb]) {
+        self.load = Load { objects: count(boxes), ..Load::default() }.with_moved(1.0).with_moved_share(1.0);
+        self.watch = Watch::Due;
     }
 
-    /// Brings the load up to date: sampled where that pays, else scaled from the last sample.
-    pub(super) fn decide(&mut self, boxes: &[Aabb]) {
+    /// Brings the load up to date. Returns the nanoseconds of samples and looks: they have a budget of their own.
+    pub(super) fn update(&mut self, boxes: &[Aabb]) -> f64 {
+        let started = Instant::now();
         let objects = count(boxes);
-        let pairs = self.before.map(|(n, pairs)| scaled(pairs as f64, objects, n));
         self.look(boxes);
-        let motion = self.motion.motion();
-        self.sampled_ns = 0.0;
+        let pairs = self.knows_pairs.then(|| scaled(self.pace.pairs_before as f64, objects, self.pace.before));
         let mut plan = FramePlan::default();
+        let mut spent_ns = 0.0;
         if self.is_sample_due(objects) {
-            let started = Instant::now();
-            (self.load, plan) = Load::planned(boxes, pairs, motion);
+            (self.load, plan) = Load::planned(boxes, pairs, self.motion);
             #[cfg(test)]
             counted::spend(counted::sample_ns(boxes.len()));
-            let took = started.elapsed().as_nanos() as f64;
-            self.sampled_ns = took;
-            self.sample_ns = if self.sample_ns > 0.0 { took.min(self.sample_ns * COST_RISES) } else { took };
-            self.motion.want();
-            (self.sampled, self.age, self.passed_ns) = (objects, 0, 0.0);
+            spent_ns = started.elapsed().as_nanos() as f64;
+            self.sample_ns = capped(spent_ns, self.sample_ns);
+            self.want_motion();
+            (self.sampled, self.age, self.since_sample_ns) = (Some(objects), 0, 0.0);
         } else {
             self.load = self.load.rescaled(objects, pairs.unwrap_or(self.load.pairs));
-            self.load = motion.map_or(self.load, |motion| self.load.with_motion(motion));
+            self.load = self.motion.map_or(self.load, |motion| self.load.with_motion(motion));
         }
         self.plan = plan.with_moved(self.moved()).with_pairs(pairs);
-        self.throttle.decide(objects);
+        spent_ns
     }
 
-    /// Looks how far the boxes of a frame have moved, where those of the frame before were remembered. Whether they
-    /// move at another pace.
+    fn is_sample_due(&self, objects: u32) -> bool {
+        let Some(sampled) = self.sampled else { return true };
+        let drift = drift(objects, sampled);
+        let rested = self.age >= SAMPLE_EVERY || drift > DRIFTED;
+        let budget_ns = self.since_sample_ns * (SAMPLE_SHARE + SHARE_OF_DRIFT * drift);
+        rested && budget_ns >= self.sample_ns
+    }
+
+    /// Compares the boxes with the remembered ones of the previous frame, if there are any. Returns whether the pace
+    /// has changed.
     fn look(&mut self, boxes: &[Aabb]) -> bool {
-        std::mem::take(&mut self.watching) && self.motion.look(boxes)
+        if self.watch != Watch::Watching {
+            return false;
+        }
+        let started = Instant::now();
+        let motion = self.displacement.motion(boxes);
+        #[cfg(test)]
+        counted::spend(counted::LOOK_NS);
+        // To remember the boxes takes about as long as to compare them.
+        self.look_ns = capped(2.0 * started.elapsed().as_nanos() as f64, self.look_ns);
+        let same = self.motion.zip(motion).is_some_and(|(before, now)| is_same_pace(before.moved, now.moved));
+        (self.motion, self.since_look_ns, self.watch) = (motion, 0.0, Watch::Resting);
+        !same
+    }
+
+    fn want_motion(&mut self) {
+        if self.watch == Watch::Resting {
+            self.watch = Watch::Due;
+        }
+    }
+
+    /// Takes in a frame that needed no decision.
+    pub(super) fn went_on(&mut self, boxes: &[Aabb], pairs: u64, epoch: &Epoch) {
+        self.pace.ran(count(boxes), pairs);
+        if self.watch == Watch::Watching && self.look(boxes) {
+            self.pace.wake();
+        }
+        if epoch.is_off(self.pace.rest_ns()) {
+            self.want_motion();
+            self.pace.wake();
+        }
+    }
+
+    /// Takes in a frame that was decided, or belongs to a trial, or stood out.
+    pub(super) fn ran(&mut self, boxes: &[Aabb], pairs: u64) {
+        self.look(boxes);
+        // What was worked out for this frame holds for no other.
+        self.plan = FramePlan::default();
+        self.pace.ran(count(boxes), pairs);
+        self.knows_pairs = true;
+        // Not when it is decided: a frame may be decided twice before it runs.
+        let pays = self.look_ns > 0.0 && self.since_look_ns * LOOK_SHARE >= self.look_ns;
+        if self.watch == Watch::Due || pays {
+            self.displacement.watch(boxes);
+            self.watch = Watch::Watching;
+        }
+    }
+
+    /// Takes in the time of frames.
+    pub(super) fn passed(&mut self, frames: u32, ns: f64) {
+        self.age = self.age.saturating_add(frames);
+        self.since_sample_ns += ns;
+        self.since_look_ns += ns;
+    }
+
+    /// After a frame that failed, nothing is known of the previous one.
+    pub(super) fn failed(&mut self) {
+        (self.knows_pairs, self.motion, self.watch) = (false, None, Watch::Resting);
+        self.sampled = None;
+        self.pace.wake();
     }
 
     /// Frames since the last sample.
@@ -104,97 +177,18 @@ impl LoadTracker {
     pub(super) fn age(&self) -> u32 {
         self.age
     }
-
-    fn is_sample_due(&self, objects: u32) -> bool {
-        let drift = drift(objects, self.sampled);
-        let rested = self.age >= SAMPLE_EVERY || drift > 1.0 / 16.0;
-        self.before.is_none() || rested && self.passed_ns * (SHARE + SHARE_OF_DRIFT * drift) >= self.sample_ns
-    }
-
-    /// Takes note of a frame that ran without a decision, the last of those that have `passed`, and of its wanted
-    /// pairs: every algorithm has the same number of them. Unwanted ones that some algorithms find count as their
-    /// slowness.
-    pub(super) fn passes(&mut self, boxes: &[Aabb], pairs: u64, passed: &Passed) {
-        self.throttle.ran(count(boxes), pairs);
-        // A look alone takes a tenth of a decision, and most looks find the pace of before.
-        if self.look(boxes) {
-            self.throttle.wake();
-        }
-        if passed.is_off(self.throttle.rest_ns()) {
-            // Boxes may move at another pace.
-            self.motion.want();
-            self.throttle.wake();
-        }
-        if passed.is_over_budget() {
-            self.throttle.wake();
-        }
-    }
-
-    /// Takes in the frames that ran without a decision.
-    pub(super) fn went_on(&mut self, passed: &Passed) {
-        self.before = Some(self.throttle.before());
-        self.age = self.age.saturating_add(passed.frames);
-        let ns = f64::from(passed.frames) * passed.mean_ns().unwrap_or(self.throttle.frame_ns());
-        self.passed_ns += ns;
-        self.motion.passed(ns);
-    }
-
-    /// Takes in a frame that was decided on, or stood out among those that were not: its wanted pairs, and how long it
-    /// took in nanoseconds.
-    pub(super) fn ran(&mut self, boxes: &[Aabb], pairs: u64, ns: f64) {
-        // One that was not decided on: the next one would be compared with the one before it.
-        self.look(boxes);
-        // What was worked out for this frame holds for no other.
-        self.plan = FramePlan::default();
-        self.throttle.ran(count(boxes), pairs);
-        self.before = Some(self.throttle.before());
-        self.age = self.age.saturating_add(1);
-        self.passed_ns += ns;
-        self.motion.passed(ns);
-        self.watching |= self.motion.ran(boxes);
-    }
-
-    /// What of the last decision, which took so many nanoseconds, was no sample: samples have a share of the time of
-    /// their own.
-    pub(super) fn without_sample(&self, decision_ns: f64) -> f64 {
-        (decision_ns - self.sampled_ns).max(0.0)
-    }
-
-    /// What a decision without its sample took, where that is known, and its frame, in nanoseconds.
-    pub(super) fn took(&mut self, decision_ns: Option<f64>, frame_ns: f64) {
-        self.throttle.took(decision_ns, frame_ns);
-    }
-
-    /// What a decision takes in the mean, without a sample, in nanoseconds.
-    pub(super) fn decision_ns(&self) -> f64 {
-        self.throttle.decision_ns()
-    }
-
-    /// The next decision is that many frames away at most.
-    pub(super) fn rest_no_longer_than(&mut self, frames: f64) {
-        self.throttle.rest_no_longer_than(frames);
-    }
-
-    /// The next frame is to be decided on again.
-    pub(super) fn wake(&mut self) {
-        self.throttle.wake();
-    }
-
-    /// After a frame that failed nothing is known of the one before, and the next one is decided on again.
-    pub(super) fn failed(&mut self) {
-        self.before = None;
-        self.motion.failed();
-        self.watching = false;
-        self.wake();
-    }
 }
 
-/// Boxes of a frame; an algorithm refuses more than this can tell.
-fn count(boxes: &[Aabb]) -> u32 {
+/// Boxes of a frame; an algorithm refuses more than this can count.
+pub(super) fn count(boxes: &[Aabb]) -> u32 {
     u32::try_from(boxes.len()).unwrap_or(u32::MAX)
 }
 
-/// A count that grows in proportion to the objects.
+/// A count that grows with the objects.
 fn scaled(count: f64, objects: u32, before: u32) -> f64 {
     if before == 0 { count } else { count * f64::from(objects) / f64::from(before) }
+}
+
+fn capped(ns: f64, before_ns: f64) -> f64 {
+    if before_ns > 0.0 { ns.min(COST_RISES * before_ns) } else { ns }
 }

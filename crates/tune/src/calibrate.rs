@@ -90,11 +90,12 @@ fn arrive(options: &StartOptions, registry: &Registry, began: Instant, stop: Arc
     setup.origin = Origin::Usual;
     let mut arrival = Arrival { setup, save: None, tuning: None };
     if let Some(found) = find(options, registry, &stop, &mut arrival.setup.remarks) {
-        let mut made = Instances::of(&found.tuning, registry);
+        let Found { tuning, origin, measured, file } = found;
+        let tuning = tuning.for_running();
+        let mut made = Instances::of(&tuning, registry);
         if let Some(e) = made.failure() {
             arrival.setup.remarks.push(format!("no algorithm of the predicted tuning can be made: {e:#}"));
         } else {
-            let Found { tuning, origin, measured, file } = found;
             arrival.setup.origin = origin;
             arrival.setup.file = file.as_ref().map(|file| file.path().to_owned());
             arrival.save = file.map(|file| Box::new(move |learned: &Tuning| file.write(learned, measured)) as _);

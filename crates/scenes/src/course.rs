@@ -1,0 +1,55 @@
+//! Courses: scenes whose load changes from one frame to the next, as in games.
+
+use crate::Scenario;
+
+/// A scene of which a frame may have fewer boxes, and which may make several steps a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Course {
+    /// A menu of 40 boxes for 150 frames, then the level.
+    Level,
+    /// For 200 frames in the middle all goes twelve times as fast.
+    Fight,
+    /// Every 50 frames half of the objects leave or come back.
+    Pooled,
+}
+
+impl Course {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Level, Self::Fight, Self::Pooled];
+
+    /// Its name, and that of its file.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Level => "level",
+            Self::Fight => "fight",
+            Self::Pooled => "pooled",
+        }
+    }
+
+    /// The scenario of its boxes.
+    #[must_use]
+    pub fn scenario(self) -> Scenario {
+        match self {
+            Self::Level => Scenario::Mixed,
+            Self::Fight => Scenario::Uniform,
+            Self::Pooled => Scenario::Clustered,
+        }
+    }
+
+    /// How many of `objects` boxes are there in a frame.
+    #[must_use]
+    pub fn boxes(self, frame: usize, objects: usize) -> usize {
+        match self {
+            Self::Level if frame < 150 => 40,
+            Self::Pooled if (frame / 50).is_multiple_of(2) => objects / 2,
+            _ => objects,
+        }
+    }
+
+    /// Steps that the scene makes after a frame.
+    #[must_use]
+    pub fn steps(self, frame: usize) -> usize {
+        if self == Self::Fight && (200..400).contains(&frame) { 12 } else { 1 }
+    }
+}

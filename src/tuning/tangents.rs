@@ -1,0 +1,111 @@
+//! Costs near a load: first-order expansions of the logarithms of the cost curves.
+//!
+//! A full evaluation compares the load with every place of the residuals, which are in no cache when a frame begins.
+//! An expansion of all candidates has a few cache lines, and holds while the load stays near.
+
+use super::AlgorithmCost;
+use crate::algorithm::Load;
+use crate::cost::Frame;
+
+const COORDINATES: usize = 6;
+
+/// Half the extent of an expansion by coordinate: natural logarithms of the objects, of pairs, strip candidates and
+/// axis candidates an object, of the motion, and the share of moved boxes. `within_the_extent_errors_are_small` holds
+/// the errors to 2 %.
+const EXTENT: [f32; COORDINATES] = [0.2, 0.4, 0.4, 0.4, 0.25, 0.15];
+/// Candidates or pairs an object, and motion, below which loads count as alike.
+const FEW: f64 = 0.05;
+const STILL: f64 = 0.01;
+
+/// Expansions of some costs around one load.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Tangents {
+    at: Option<[f32; COORDINATES]>,
+    /// By cost: the logarithm at the load, and its slopes.
+    costs: Vec<[f32; COORDINATES + 1]>,
+}
+
+impl Tangents {
+    /// Room for this many costs.
+    pub(crate) fn new(costs: usize) -> Self {
+        Self { at: None, costs: vec![[0.0; COORDINATES + 1]; costs] }
+    }
+
+    /// Passes the position and nanoseconds of each cost under a load to `each`. Expands anew if the load is too far.
+    pub(crate) fn evaluate(&mut self, load: &Load, costs: &[AlgorithmCost], mut each: impl FnMut(usize, f64)) {
+        let x = coordinates(load);
+        let near =
+            |at: &[f32; COORDINATES]| at.iter().zip(x).zip(EXTENT).all(|((at, x), extent)| (at - x).abs() <= extent);
+        let at = match self.at.filter(near) {
+            Some(at) => at,
+            None => {
+                self.expand(load, costs);
+                self.at = Some(x);
+                x
+            }
+        };
+        let offset: [f32; COORDINATES] = std::array::from_fn(|c| x[c] - at[c]);
+        for (k, [ln, slopes @ ..]) in self.costs.iter().enumerate() {
+            let ln = slopes.iter().zip(offset).fold(*ln, |sum, (slope, by)| sum + slope * by);
+            each(k, f64::from(ln.exp()));
+        }
+    }
+
+    fn expand(&mut self, load: &Load, costs: &[AlgorithmCost]) {
+        let fill = |entry: usize, load: &Load, tangents: &mut Vec<[f32; COORDINATES + 1]>| {
+            let frame = Frame::new(load);
+            for (tangent, cost) in tangents.iter_mut().zip(costs) {
+                tangent[entry] = cost.curve.cost_of(&frame).max(f64::MIN_POSITIVE).ln() as f32;
+            }
+        };
+        fill(0, load, &mut self.costs);
+        for c in 0..COORDINATES {
+            let (other, step) = stepped(load, c);
+            fill(1 + c, &other, &mut self.costs);
+            let slope = |tangent: &mut [f32; COORDINATES + 1]| tangent[1 + c] = (tangent[1 + c] - tangent[0]) / step;
+            self.costs.iter_mut().for_each(slope);
+        }
+    }
+}
+
+fn coordinates(load: &Load) -> [f32; COORDINATES] {
+    let n = f64::from(load.objects.max(1));
+    let each = |count: f64| (count / n + FEW).ln() as f32;
+    [
+        n.ln() as f32,
+        each(load.pairs),
+        each(load.strip_candidates),
+        each(load.axis_candidates),
+        (load.moved + STILL).ln() as f32,
+        load.moved_share as f32,
+    ]
+}
+
+/// A load half the extent away along one coordinate, and by how much that differs.
+fn stepped(load: &Load, coordinate: usize) -> (Load, f32) {
+    let step = f64::from(EXTENT[coordinate]) / 2.0;
+    let n = f64::from(load.objects.max(1));
+    let more = |count: f64| (count + FEW * n) * step.exp() - FEW * n;
+    let other = match coordinate {
+        0 => {
+            // What is counted by the object stays.
+            let objects = (n * step.exp()).ceil();
+            let more = |count: f64| count * objects / n;
+            Load {
+                objects: objects as u32,
+                pairs: more(load.pairs),
+                strip_candidates: more(load.strip_candidates),
+                axis_candidates: more(load.axis_candidates),
+                ..*load
+            }
+        }
+        1 => Load { pairs: more(load.pairs), ..*load },
+        2 => Load { strip_candidates: more(load.strip_candidates), ..*load },
+        3 => Load { axis_candidates: more(load.axis_candidates), ..*load },
+        4 => Load { moved: (load.moved + STILL) * step.exp() - STILL, ..*load },
+        // Towards the middle, so that it stays a share.
+        _ if load.moved_share > 0.5 => return (Load { moved_share: load.moved_share - step, ..*load }, -step as f32),
+        _ => return (Load { moved_share: load.moved_share + step, ..*load }, step as f32),
+    };
+    (other, coordinates(&other)[coordinate] - coordinates(load)[coordinate])
+}
