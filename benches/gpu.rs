@@ -6,6 +6,7 @@
 //! SAPWISE_GPUS=gpu1,gpu0+1 cargo bench -p sapwise-bench --bench gpu   # these, numbered as in `sapwise devices`
 //! cargo bench -p sapwise-bench --bench gpu -- --dispatches            # where a frame on one GPU spends its time
 //! cargo bench -p sapwise-bench --bench gpu -- --dispatches 1000,5000  # at these sizes
+//! cargo bench -p sapwise-bench --bench gpu -- --stream DIR            # the time of each frame, and its boxes
 //! ```
 //!
 //! Prints a table in Markdown, each size as soon as it is measured: wall clock, median and quartiles over the frames.
@@ -22,6 +23,8 @@
 
 #[path = "gpu/dispatches.rs"]
 mod dispatches;
+#[path = "gpu/stream.rs"]
+mod stream;
 
 use sapwise::algorithm::{Backend, usable_cores};
 use sapwise::{Aabb, AlgorithmId, BroadPhase, Pairs, Registry};
@@ -31,14 +34,15 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::hint::black_box;
 use std::io::Write;
+use std::path::Path;
 use std::process::ExitCode;
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
 const SIZES: [usize; 5] = [1_000, 10_000, 100_000, 1_000_000, 10_000_000];
 
-/// Sizes of `--dispatches`.
-const SIZES_OF_DISPATCHES: &str = "100000,1000000,10000000";
+/// Sizes of `--dispatches` and `--stream`.
+const LARGE_SIZES: &str = "100000,1000000,10000000";
 
 /// Frames of a size.
 const FRAMES: usize = 4;
@@ -145,7 +149,7 @@ fn device_resident(gpus: &Gpus, index: u32, method: &str, busy: Busy) -> Result<
         let start = Instant::now();
         let pairs = resident.find_pairs(&buffer, boxes.len() as u32).map_err(|e| e.to_string())?;
         let elapsed = start.elapsed();
-        let fingerprint = download(&gpu, pairs)?;
+        let fingerprint = download(&gpu, pairs)?.fingerprint();
         busy.worked();
         on_gpu = Some(buffer);
         Ok((elapsed, fingerprint))
@@ -158,7 +162,7 @@ fn upload(gpu: &Gpu, boxes: &[Aabb], last: Option<wgpu::Buffer>) -> Result<wgpu:
     let buffer = match last {
         Some(buffer) if buffer.size() >= size => buffer,
         _ => {
-            let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+            let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
             let descriptor = wgpu::BufferDescriptor { label: Some("boxes"), size, usage, mapped_at_creation: false };
             gpu.try_make(|device| device.create_buffer(&descriptor)).map_err(|e| e.to_string())?
         }
@@ -171,8 +175,8 @@ fn upload(gpu: &Gpu, boxes: &[Aabb], last: Option<wgpu::Buffer>) -> Result<wgpu:
     Ok(buffer)
 }
 
-/// Downloads pairs, and returns their fingerprint.
-fn download(gpu: &Gpu, found: ResidentPairs<'_>) -> Result<u64, String> {
+/// Downloads pairs.
+fn download(gpu: &Gpu, found: ResidentPairs<'_>) -> Result<Pairs, String> {
     let mut pairs = Pairs::new();
     let size = u64::from(found.count) * 8;
     if size > 0 {
@@ -189,7 +193,7 @@ fn download(gpu: &Gpu, found: ResidentPairs<'_>) -> Result<u64, String> {
         bytes.chunks_exact(8).for_each(|pair| pairs.push(number(&pair[..4]), number(&pair[4..])));
     }
     pairs.finish().map_err(|e| e.to_string())?;
-    Ok(pairs.fingerprint())
+    Ok(pairs)
 }
 
 /// Returns the algorithms on the GPUs of `SAPWISE_GPUS`, or on all GPUs.
@@ -222,18 +226,30 @@ fn quartiles(samples: &[f64]) -> [f64; 3] {
     })
 }
 
-/// Runs all contestants on frames of one size in turn, and prints their rows. Adds a remark for whatever went wrong.
-fn measure(objects: usize, rounds: usize, contestants: &mut [Contestant], remarks: &mut Vec<String>) {
-    let mut racing: Vec<&mut Contestant> = contestants.iter_mut().filter(|c| c.takes_part(objects)).collect();
-    if racing.is_empty() {
-        return;
-    }
+/// Returns the frames of a size.
+fn frames_of(objects: usize) -> Vec<Vec<Aabb>> {
     let mut scene = Scenario::Uniform.start(objects, 1);
     let mut frames = vec![scene.boxes().to_vec()];
     while frames.len() < FRAMES {
         scene.advance();
         frames.push(scene.boxes().to_vec());
     }
+    frames
+}
+
+/// Returns the frame of a round: there and back again, so that consecutive frames are neighbours in time.
+fn there_and_back(round: usize) -> usize {
+    let at = round % (2 * FRAMES - 2);
+    if at < FRAMES { at } else { 2 * FRAMES - 2 - at }
+}
+
+/// Runs all contestants on frames of one size in turn, and prints their rows. Adds a remark for whatever went wrong.
+fn measure(objects: usize, rounds: usize, contestants: &mut [Contestant], remarks: &mut Vec<String>) {
+    let mut racing: Vec<&mut Contestant> = contestants.iter_mut().filter(|c| c.takes_part(objects)).collect();
+    if racing.is_empty() {
+        return;
+    }
+    let frames = frames_of(objects);
     racing.iter_mut().for_each(|c| c.seconds.clear());
     let mut expected = [None; FRAMES];
     let start = Instant::now();
@@ -242,9 +258,7 @@ fn measure(objects: usize, rounds: usize, contestants: &mut [Contestant], remark
         if round > FEWEST_ROUNDS && start.elapsed() > TIME {
             break;
         }
-        // There and back again, so that consecutive frames are neighbours in time.
-        let at = round % (2 * FRAMES - 2);
-        let at = if at < FRAMES { at } else { 2 * FRAMES - 2 - at };
+        let at = there_and_back(round);
         let count = racing.len();
         for place in 0..count {
             // Each begins in turn, and every other round goes backwards, so that no contestant always follows the
@@ -308,15 +322,25 @@ fn bench() -> Result<Vec<String>, String> {
     for gpu in gpus.identities() {
         println!("- gpu{}: {}, {}, {}", gpu.index, gpu.name, gpu.api, gpu.driver);
     }
-    if let Some(at) = std::env::args().position(|argument| argument == "--dispatches") {
-        let sizes = std::env::args().nth(at + 1).filter(|sizes| !sizes.starts_with('-'));
-        let sizes = sizes.as_deref().unwrap_or(SIZES_OF_DISPATCHES).split(',').map(str::parse);
-        let sizes = sizes.collect::<Result<Vec<usize>, _>>().map_err(|e| format!("--dispatches: {e}"))?;
+    let words: Vec<String> = std::env::args().collect();
+    let after = |option: &str| words.iter().position(|w| w == option).map(|at| &words[at + 1..]);
+    let value = |word: Option<&String>| word.filter(|w| !w.starts_with('-')).cloned();
+    let stream = after("--stream");
+    if let Some(rest) = stream.or(after("--dispatches")) {
+        let folder = stream.map(|rest| value(rest.first()).ok_or("--stream needs a folder")).transpose()?;
+        let sizes = value(rest.get(usize::from(folder.is_some()))).unwrap_or_else(|| LARGE_SIZES.to_owned());
+        let sizes = sizes.split(',').map(str::parse);
+        let sizes = sizes.collect::<Result<Vec<usize>, _>>().map_err(|e| format!("sizes: {e}"))?;
         let first = on_gpus(&registry)?.first().and_then(|id| match id.backend() {
             Backend::Gpu(indices) => indices.first().copied(),
             _ => None,
         });
-        return dispatches::print(&gpus, first.ok_or("there is no GPU")?, &sizes).map(|()| Vec::new());
+        let first = first.ok_or("there is no GPU")?;
+        match folder {
+            Some(folder) => stream::print(&gpus, first, &sizes, Path::new(&folder))?,
+            None => dispatches::print(&gpus, first, &sizes)?,
+        }
+        return Ok(Vec::new());
     }
     let mut remarks = Vec::new();
     let mut cpu = vec![1, usable_cores()];
@@ -347,7 +371,7 @@ fn bench() -> Result<Vec<String>, String> {
          |---|---|---|---|---|---|---|---|",
         usable_cores()
     );
-    let full = std::env::args().any(|argument| argument == "--bench");
+    let full = words.iter().any(|word| word == "--bench");
     for &objects in if full { &SIZES[..] } else { &SIZES[..1] } {
         eprintln!("{objects} objects");
         measure(objects, if full { ROUNDS } else { FEWEST_ROUNDS }, &mut contestants, &mut remarks);
