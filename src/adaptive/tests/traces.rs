@@ -217,7 +217,7 @@ fn over_traces_the_choice_costs_little_more_than_the_best_single_algorithm() {
         let host = folder.join(host);
         let traces = Trace::all(&host);
         for (what, most) in ["measured", "predicted", "other"].into_iter().zip(most) {
-            let tuning = read_tuning(&host.join(format!("{what}.json")));
+            let tuning = read_tuning(&host.join(format!("{what}.tuning")));
             let over = |trace: &Arc<Trace>| {
                 let over = play(trace, &tuning) / trace.best_single_ns(&tuning);
                 println!("{what}: {} {over:.3}", trace.name);
