@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 pub use error::CurveError;
 pub use helpers::Helpers;
-pub(crate) use residual::Likeness;
+use residual::Likeness;
 pub use residual::{Places, Residual};
 pub(crate) use term::Counts;
 pub use term::{Product, Term};
@@ -75,24 +75,7 @@ pub(crate) struct Frame<'a> {
     /// Of the first places that were asked for; the methods of a tuning share theirs.
     likeness: OnceCell<(Arc<Places>, Likeness)>,
     /// Costs of works, which the algorithms of a method share.
-    known: [Cell<Option<(&'a Work, WorkCost)>>; 8],
-}
-
-/// Nanoseconds of a work, and the factor of its residual in them.
-#[derive(Debug, Clone, Copy)]
-struct WorkCost {
-    ns: f64,
-    factor: f64,
-}
-
-/// Nanoseconds of a frame of one algorithm under one load.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct FrameCost {
-    pub(crate) ns: f64,
-    /// With the fallback, if there is one.
-    pub(crate) fallback_ns: Option<f64>,
-    /// The part due to calls: on several threads calling helpers and waiting for them, otherwise [`Term::Call`].
-    pub(crate) calls_ns: f64,
+    known: [Cell<Option<(&'a Work, f64)>>; 8],
 }
 
 impl<'a> Frame<'a> {
@@ -100,18 +83,16 @@ impl<'a> Frame<'a> {
         Self { counts: Counts::new(load), load, likeness: OnceCell::new(), known: [const { Cell::new(None) }; 8] }
     }
 
-    /// Passes on how similar the load is to each of these places.
-    pub(crate) fn likeness<R>(&self, places: &Arc<Places>, look: impl FnOnce(&Likeness) -> R) -> R {
-        let (of, likeness) = self.likeness.get_or_init(|| (Arc::clone(places), places.likeness_of(self.load)));
-        if Arc::ptr_eq(of, places) { look(likeness) } else { look(&places.likeness_of(self.load)) }
-    }
-
     /// The factor of a residual on a cost.
     fn factor(&self, residual: Option<&Residual>) -> f64 {
-        residual.map_or(1.0, |residual| self.likeness(&residual.places, |likeness| residual.ln_of(likeness)).exp())
+        let Some(residual) = residual else { return 1.0 };
+        let places = &residual.places;
+        let (of, likeness) = self.likeness.get_or_init(|| (Arc::clone(places), places.likeness_of(self.load)));
+        let ln = if Arc::ptr_eq(of, places) { residual.ln_of(likeness) } else { residual.ln(self.load) };
+        ln.exp()
     }
 
-    fn work(&self, work: &'a Work) -> WorkCost {
+    fn work(&self, work: &'a Work) -> f64 {
         for known in &self.known {
             match known.get() {
                 Some((of, cost)) if std::ptr::eq(of, work) => return cost,
@@ -146,14 +127,13 @@ impl Work {
     /// Returns the nanoseconds of a frame under `load`.
     #[must_use]
     pub fn ns(&self, load: &Load) -> f64 {
-        self.cost_of(&Frame::new(load)).ns
+        self.cost_of(&Frame::new(load))
     }
 
-    fn cost_of<'a>(&'a self, frame: &Frame<'a>) -> WorkCost {
+    fn cost_of<'a>(&'a self, frame: &Frame<'a>) -> f64 {
         let sum: f64 = self.terms.iter().map(|t| t.unit_ns * frame.counts.of(t.term, self.cache_bytes)).sum();
-        let least = self.fallback.as_ref().map_or(sum, |f| sum.min(f.factor * frame.work(&f.work).ns));
-        let factor = frame.factor(self.residual.as_ref());
-        WorkCost { ns: least * factor, factor }
+        let least = self.fallback.as_ref().map_or(sum, |f| sum.min(f.factor * frame.work(&f.work)));
+        least * frame.factor(self.residual.as_ref())
     }
 
     /// Returns what makes it unusable, if anything.
@@ -234,45 +214,9 @@ impl CostCurve {
     }
 
     pub(crate) fn cost_of<'a>(&'a self, frame: &Frame<'a>) -> f64 {
-        self.on_helpers(frame.work(&self.work).ns, frame) * frame.factor(self.residual.as_ref())
-    }
-
-    /// The cost on several threads of work that takes this long on one.
-    fn on_helpers(&self, work_ns: f64, frame: &Frame<'_>) -> f64 {
-        self.helpers.map_or(work_ns, |h| h.cost_ns(frame.load.objects, work_ns))
-    }
-
-    /// Returns the cost, its part that is due to calls, and the cost with the fallback.
-    pub(crate) fn parts_of<'a>(&'a self, frame: &Frame<'a>) -> FrameCost {
-        let work = frame.work(&self.work);
-        let correction = frame.factor(self.residual.as_ref());
-        let calls_ns = match self.helpers {
-            Some(helpers) => helpers.calls_ns(frame.load.objects, work.ns),
-            None => {
-                let calls = self.work.terms.iter().filter(|t| t.term == Term::Call);
-                calls.map(|t| t.unit_ns).sum::<f64>() * work.factor
-            }
-        };
-        let fallback_ns = |f: &'a Fallback| self.on_helpers(f.factor * frame.work(&f.work).ns * work.factor, frame);
-        FrameCost {
-            ns: self.on_helpers(work.ns, frame) * correction,
-            fallback_ns: self.work.fallback.as_ref().map(|f| fallback_ns(f) * correction),
-            calls_ns: calls_ns * correction,
-        }
-    }
-
-    /// Multiplies the part that is due to [calls](FrameCost::calls_ns).
-    pub(crate) fn scale_calls(&mut self, factor: f64) {
-        match &mut self.helpers {
-            Some(helpers) => {
-                helpers.call_ns *= factor;
-                helpers.late_ns *= factor;
-            }
-            None => {
-                let terms = &mut self.work_mut().terms;
-                terms.iter_mut().filter(|t| t.term == Term::Call).for_each(|t| t.unit_ns *= factor);
-            }
-        }
+        let work_ns = frame.work(&self.work);
+        let ns = self.helpers.map_or(work_ns, |h| h.cost_ns(frame.load.objects, work_ns));
+        ns * frame.factor(self.residual.as_ref())
     }
 
     /// Returns what makes this curve unusable, if anything.
@@ -326,9 +270,6 @@ mod tests {
         let one = CostCurve::new(vec![CostTerm::new(Term::Call, 50.0), CostTerm::new(Term::Objects, 10.0)]);
         let two = one.clone().with_helpers(Helpers::new(2).with_call(1000.0, 0.0));
         assert_eq!((one.cost_ns(&load(1000)), two.cost_ns(&load(1000))), (10_050.0, 6025.0));
-        let large = load(1000);
-        let frame = Frame::new(&large);
-        assert_eq!((one.parts_of(&frame).calls_ns, two.parts_of(&frame).calls_ns), (50.0, 1000.0));
         // Both share one work, which is computed once.
         assert!(Arc::ptr_eq(&one.work, &two.work));
     }

@@ -11,7 +11,6 @@ pub use crate::load::{SampledBoxes, SceneStats, StripGrid};
 pub use crate::pair::Pair;
 pub use crate::pairs::Parallel;
 pub use crate::ray::{Ray, RayDefect};
-pub use crate::tuning::corrected;
 pub use crate::{splitmix, stats};
 #[cfg(feature = "schema")]
 pub use schemars;

@@ -8,8 +8,8 @@ mod strip_grid;
 
 use crate::aabb::Aabb;
 
+pub(crate) use displacement::is_same_pace;
 pub use displacement::{Displacement, Motion};
-pub(crate) use displacement::{is_same_pace, paces_apart_ln};
 pub use plan::FramePlan;
 pub use sampled_boxes::SampledBoxes;
 pub use scene_stats::SceneStats;

@@ -1,7 +1,5 @@
 //! Tunings: the cheapest algorithm for each load (the paper's fields of optimal performance).
 
-pub(crate) mod belief;
-mod corrected;
 mod crossover;
 mod error;
 #[cfg(feature = "serde")]
@@ -18,7 +16,6 @@ use slice::Slice;
 use std::sync::Arc;
 
 pub use crate::cost::{CostCurve, CostTerm, Product, Term};
-pub use corrected::corrected;
 pub use crossover::Crossover;
 pub use error::TuningError;
 

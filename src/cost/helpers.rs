@@ -41,14 +41,6 @@ impl Helpers {
         share * self.call_ns + work_ns.min((work_ns + self.late_ns) / self.speed_up_of(share))
     }
 
-    /// Returns the part of that cost that goes to calling helpers and waiting for them.
-    pub(crate) fn calls_ns(&self, objects: u32, work_ns: f64) -> f64 {
-        let Some(share) = self.share(objects) else { return 0.0 };
-        let speed_up = self.speed_up_of(share);
-        let late = (work_ns + self.late_ns) / speed_up < work_ns;
-        share * self.call_ns + if late { self.late_ns / speed_up } else { 0.0 }
-    }
-
     /// Share of the helpers that a frame of `objects` boxes calls; `None` if it calls none.
     fn share(&self, objects: u32) -> Option<f64> {
         if self.boxes_per_thread == 0 || self.threads < 2 {

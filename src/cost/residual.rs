@@ -53,7 +53,7 @@ pub struct Residual {
 
 /// Similarity of a load to each place, 0 to 1.
 #[derive(Debug, Clone)]
-pub(crate) struct Likeness {
+pub(super) struct Likeness {
     by_motion: [f64; Places::MOST],
     whatever_moves: [f64; Places::MOST],
 }
@@ -111,7 +111,7 @@ impl Places {
         Arc::new(Self::new((0..7).map(load).collect()))
     }
 
-    pub(crate) fn likeness_of(&self, load: &Load) -> Likeness {
+    pub(super) fn likeness_of(&self, load: &Load) -> Likeness {
         let at = coordinates_of(load, self.octaves);
         let count = self.loads.len();
         let mut likeness = Likeness { by_motion: [0.0; Self::MOST], whatever_moves: [0.0; Self::MOST] };
@@ -147,7 +147,7 @@ impl From<Places> for Vec<Load> {
 }
 
 impl Likeness {
-    pub(crate) fn of(&self, by_motion: bool) -> &[f64; Places::MOST] {
+    fn of(&self, by_motion: bool) -> &[f64; Places::MOST] {
         if by_motion { &self.by_motion } else { &self.whatever_moves }
     }
 }
@@ -171,7 +171,7 @@ impl Residual {
         self.ln_of(&self.places.likeness_of(load))
     }
 
-    pub(crate) fn ln_of(&self, likeness: &Likeness) -> f64 {
+    pub(super) fn ln_of(&self, likeness: &Likeness) -> f64 {
         // Four sums side by side: one would wait for each addition.
         let mut sums = [0.0; 4];
         let (weights, likeness) = (self.weights.chunks_exact(4), likeness.of(self.by_motion));
@@ -180,14 +180,6 @@ impl Residual {
             sums.iter_mut().zip(w.iter().zip(k)).for_each(|(sum, (w, k))| *sum += w * k);
         }
         self.constant + sums.iter().sum::<f64>() + rest
-    }
-
-    /// Adds a residual at the same places.
-    pub(crate) fn plus(mut self, other: &Self) -> Self {
-        self.constant += other.constant;
-        self.weights.resize(self.weights.len().max(other.weights.len()), 0.0);
-        self.weights.iter_mut().zip(&other.weights).for_each(|(w, o)| *w += o);
-        self
     }
 
     /// Whether its weights are finite and no more than there are places.

@@ -12,18 +12,12 @@ const MOST_EDGE: f32 = 1.0e30;
 /// Slower boxes than this, in edges a frame, count as still.
 const STILL: f64 = 0.01;
 
-/// Returns the distance of two speeds, in edges a frame: the absolute logarithm of their ratio, about 0 if boxes count
-/// as still at both.
-pub(crate) fn paces_apart_ln(one: f64, other: f64) -> f64 {
-    ((one + STILL) / (other + STILL)).ln().abs()
-}
-
 /// Speeds closer than this may be the same: few boxes are watched.
 const SAME_PACE_LN: f64 = 0.25;
 
 /// Returns whether two values of [`Motion::moved`] may stand for the same speed.
 pub(crate) fn is_same_pace(one: f64, other: f64) -> bool {
-    paces_apart_ln(one, other) < SAME_PACE_LN
+    ((one + STILL) / (other + STILL)).ln().abs() < SAME_PACE_LN
 }
 
 /// Share of its mean edge by which a box moves at least to count in [`Motion::moved_share`].

@@ -20,7 +20,7 @@ use std::sync::Arc;
 const MACHINE_LN: f64 = 0.1;
 /// Standard deviation of a timing around its residual, in natural logarithms. A third more changes no regret
 /// noticeably.
-const NOISE_LN: f64 = 0.12;
+pub(super) const NOISE_LN: f64 = 0.12;
 /// Time over the best of the point from which on a timing counts no less for lying further behind.
 const MOST_BEHIND: f64 = 4.0;
 /// Variance that each place has of its own, as a share. It keeps the weights of neighbouring places from growing
@@ -126,7 +126,7 @@ impl Basis {
     }
 
     /// Returns the weights of the places for weights of the features.
-    fn of_places(&self, mut weights: Vec<f64>, by_motion: bool) -> Vec<f64> {
+    pub(super) fn of_places(&self, mut weights: Vec<f64>, by_motion: bool) -> Vec<f64> {
         let root = &self.roots[usize::from(by_motion)];
         for k in (0..weights.len()).rev() {
             let known: f64 = (k + 1..weights.len()).map(|j| root[[j, k]] * weights[j]).sum();

@@ -1,16 +1,14 @@
 //! The costs of algorithms on one machine, from its own report.
 
 use crate::data::Profile;
+use crate::fit::correction::corrected;
 use crate::fit::designs::Designs;
-use crate::fit::load_residual::noise_ln;
 use crate::fit::model::model;
-use crate::fit::rows::{Row, rows};
+use crate::fit::rows::rows;
 use crate::report::Timed;
 use crate::text::count;
 use sapwise::algorithm::Entry;
-use sapwise::tuning;
 use sapwise::tuning::AlgorithmCost;
-use sapwise_scenes::Random;
 use sapwise_tune::hardware::{GpuParameterId, ParameterId, Quantity};
 use sapwise_tune::{Hardware, Model, Parameter};
 use std::sync::Arc;
@@ -44,7 +42,7 @@ pub(super) fn measured_costs_over(profile: &Profile, base: Option<&Model>) -> (V
         _ => format!("{} has no cost: no term explains its time", timed.id),
     };
     let warnings = lacking.map(warning).collect();
-    (corrected(&costs, profile, &all), warnings)
+    (corrected(costs, profile, &all), warnings)
 }
 
 /// Predicts some algorithms by a model that is fitted to the report alone, with its residual at the places of `base`.
@@ -65,7 +63,7 @@ pub(crate) fn costs_of_one(designs: &Designs<'_>, k: usize) -> Vec<AlgorithmCost
     chosen[k] = true;
     let Ok((model, _)) = model(designs, &chosen, "own") else { return Vec::new() };
     let costs = model.predict(&profile.hardware, &profile.with_revisions(&profile.available()));
-    costs.map_or_else(|_| Vec::new(), |p| corrected(&p.costs, profile, &rows(profile, 0, designs.without)))
+    costs.map_or_else(|_| Vec::new(), |p| corrected(p.costs, profile, &rows(profile, 0, designs.without)))
 }
 
 /// Adds a value for each missing parameter that a model reads. Any value will do when all timings are of one machine:
@@ -89,16 +87,6 @@ fn completed(hardware: &Hardware) -> Hardware {
         own.for_each(|id| add(&mut gpu.parameters, id.quantity(), id.as_str()));
     }
     completed
-}
-
-/// Corrects the costs by all timings of the report.
-fn corrected(costs: &[AlgorithmCost], profile: &Profile, all: &[Row]) -> Vec<AlgorithmCost> {
-    let position = |row: &Row| costs.iter().position(|c| c.algorithm == *profile.id(row.algorithm));
-    let rows: Vec<(usize, &Row)> = all.iter().filter(|r| !r.floor).filter_map(|r| Some((position(r)?, r))).collect();
-    // Shuffled, since the timings of one scenario in a row would look like a machine that changes.
-    let shuffled = Random::named(1, &["observations"]).shuffled(rows.len());
-    let timing = |k: usize| (rows[k].0, rows[k].1.load, rows[k].1.ns, noise_ln(rows[k].1.behind));
-    tuning::corrected(costs, shuffled.into_iter().map(timing))
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Cost terms fitted to the times of profiles.
 
 pub(crate) mod columns;
+mod correction;
 mod design;
 mod designs;
 mod late_helpers;
