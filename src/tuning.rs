@@ -1,6 +1,8 @@
 //! Tunings: the cheapest algorithm for each load (the paper's fields of optimal performance).
 
 mod crossover;
+#[cfg(test)]
+mod drawn;
 mod error;
 #[cfg(feature = "serde")]
 mod file;
