@@ -29,8 +29,8 @@ pub fn model(text: &str) -> Result<Model, Error> {
     Format::MODEL.read::<Model>(text)?.checked(Model::defect).map(|read| read.value)
 }
 
-/// The text of the built-in model.
-pub(crate) const BUILT_IN: &str = include_str!("../default.json");
+/// The text of the built-in model, from `build.rs`.
+pub(crate) const BUILT_IN: &str = include_str!(concat!(env!("OUT_DIR"), "/model.json"));
 
 impl Model {
     /// The model that comes with this library: `models/default.json`, whose card is `models/README.md`.
