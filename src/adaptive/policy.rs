@@ -47,6 +47,8 @@ const NO_ACCIDENT: i32 = 3;
 /// What a candidate's own factor keeps if the number of objects changes falls to an e-th over this logarithm.
 const SIZE_LN: f64 = 2.0;
 
+/// A frame stands out if it takes this many times the longest expected one.
+const STANDS_OUT: f64 = 3.0;
 /// Observed epochs after which a frame that takes far longer than expected waited for another program; before, it was
 /// expected wrongly.
 const KNOWN: u32 = 4;
@@ -440,7 +442,7 @@ impl Policy {
     pub(super) fn epoch(&self, candidate: usize) -> Epoch {
         let mean_ns = self.candidates[candidate].mean_ns;
         // Of a candidate that was chosen by count alone nothing is expected.
-        let most_ns = if mean_ns > 0.0 { MOST_SURPRISE * self.first_ns(candidate) } else { f64::INFINITY };
+        let most_ns = if mean_ns > 0.0 { STANDS_OUT * self.first_ns(candidate) } else { f64::INFINITY };
         Epoch::expecting(mean_ns, most_ns)
     }
 
@@ -462,7 +464,7 @@ impl Policy {
         self.trials.ran(ns - over_mean * now_ns);
         // A first frame shows no usual cost: if nothing is kept, its excess is known.
         let cold = entered && kept.is_none();
-        let most_ns = if observed < KNOWN { f64::INFINITY } else { MOST_SURPRISE * first_ns };
+        let most_ns = if observed < KNOWN { f64::INFINITY } else { STANDS_OUT * first_ns };
         let waited_ns = (ns - most_ns).max(0.0);
         if waited_ns > 0.0 {
             self.waits[wait].add(waited_ns.min(MOST_WAIT * most_ns), frame);
