@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
-# Builds the C library as its users do, installs it into a folder, and tests it there: with gcc and clang, under
-# AddressSanitizer and valgrind, through CMake and Meson, and beside Bullet.
+# Builds the C library and tests it: with gcc and clang, under AddressSanitizer and valgrind, and beside Bullet.
 #
-#   tools/c.sh             # formatting, clippy, tests of the border, and all of that
+#   tools/c.sh             # formatting, clippy, tests of the border, and all of that; needs no cargo-c
+#   tools/c.sh install     # as its users: installs it through cargo-c, then builds with it through CMake and Meson
 #   tools/c.sh overhead    # instructions of a frame through C over those through Rust, at 100 and 100 000 boxes
 #   tools/c.sh bench       # 10 000 moving boxes beside btDbvtBroadphase, into results/c.csv
 #   tools/c.sh header      # writes bindings/c/include/sapwise.h
 #
-# Needs cargo-c, compilers, CMake, Meson and Bullet; on Debian it installs them if they are missing. Everything goes
-# into target/c/.
+# Needs compilers, valgrind and Bullet; `install` also cargo-c, CMake and Meson. On Debian it installs what is missing.
+# Everything goes into target/c/.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 what=${1:-test}
@@ -21,29 +21,38 @@ fail() { echo "c: $*" >&2; exit 1; }
 export CARGO_INCREMENTAL=0 CARGO_TARGET_DIR=$folder/build
 mkdir -p "$folder"
 
-has_bullet() { [ -e /usr/include/bullet/btBulletDynamicsCommon.h ]; }
-has_tools() { command -v clang && command -v cmake && command -v meson && command -v ninja && command -v pkg-config; }
-{ has_tools && has_bullet; } >/dev/null 2>&1 || {
-    apt-get update -q
-    apt-get install -qy --no-install-recommends clang cmake libbullet-dev meson ninja-build pkg-config
-}
-
-# The last version that this compiler builds. It contains cargo, which takes minutes, once.
-cargo_c() {
-    command -v cargo-cinstall >/dev/null 2>&1 || {
-        pkg-config --exists openssl || apt-get install -qy --no-install-recommends libssl-dev
-        CARGO_TARGET_DIR=$root/target/tools CARGO_PROFILE_DEV_DEBUG=false \
-            cargo install cargo-c --version '0.10.24+cargo-0.98.0' --locked --debug --quiet
+# Installs Debian's packages if a command or Bullet is missing.
+need() {
+    local packages=$1
+    shift
+    { [ -e /usr/include/bullet/btBulletDynamicsCommon.h ] && type "$@"; } >/dev/null 2>&1 || {
+        apt-get update -q
+        # shellcheck disable=SC2086 # several packages
+        apt-get install -qy --no-install-recommends libbullet-dev $packages
     }
 }
 
-# A build and an installed library: release, or dev with what it knows of freed objects.
-installed() {
-    cargo_c
-    (cd bindings/c && cargo cinstall --quiet --locked --profile "$1" --prefix "$folder/$1" --libdir "$folder/$1/lib")
+# Builds the shared library by cargo alone. dev also knows of freed objects.
+built() {
+    local profile=$1 of=$1
+    [ "$profile" != dev ] || of=debug
+    cargo rustc --quiet --locked --manifest-path $manifest --profile "$profile" --lib --crate-type cdylib
+    mkdir -p "$folder/$profile/lib"
+    ln -sfn "$root/bindings/c/include" "$folder/$profile/include"
+    ln -sf "$CARGO_TARGET_DIR/$of/libsapwise_capi.so" "$folder/$profile/lib/libsapwise.so"
 }
 
-# Compiles one program against an installed library.
+# Builds and installs the library as its users do.
+installed() {
+    # The last version that this compiler builds. It contains cargo, which takes minutes, once.
+    command -v cargo-cinstall >/dev/null 2>&1 || {
+        CARGO_TARGET_DIR=$root/target/tools CARGO_PROFILE_DEV_DEBUG=false \
+            cargo install cargo-c --version '0.10.24+cargo-0.98.0' --locked --debug --quiet
+    }
+    (cd bindings/c && cargo cinstall --quiet --locked --release --prefix "$prefix" --libdir "$prefix/lib")
+}
+
+# Compiles one program against a library.
 compile() {
     local compiler=$1 profile=$2 out=$3
     shift 3
@@ -51,19 +60,22 @@ compile() {
         "-L$folder/$profile/lib" -lsapwise "-Wl,-rpath,$folder/$profile/lib" -lm -o "$folder/$out"
 }
 
+# Fails if a program leaks or reads what it must not.
+checked() {
+    valgrind --quiet --leak-check=full --show-leak-kinds=definite,indirect \
+        --errors-for-leak-kinds=definite,indirect --error-exitcode=1 "$@"
+}
+
 case $what in
 header)
     SAPWISE_WRITE_HEADER=1 cargo test --quiet --manifest-path $manifest --locked --test header
     ;;
 test)
+    need "clang valgrind" clang valgrind
     cargo fmt --manifest-path $manifest --check
     cargo clippy --quiet --manifest-path $manifest --all-targets --locked -- -D warnings
     cargo test --quiet --manifest-path $manifest --locked
-    installed release
-    installed dev
-    bytes=$(stat -L -c %s "$folder/release/lib/libsapwise.so")
-    echo "c: the shared library has $bytes bytes"
-    [ "$bytes" -le 2000000 ] || fail "it has more than 2 MB"
+    built dev
     sanitize=(-fsanitize=address,undefined -fno-sanitize-recover=all)
     export ASAN_OPTIONS=detect_stack_use_after_return=1 UBSAN_OPTIONS=print_stacktrace=1
     for pair in gcc:g++ clang:clang++; do
@@ -72,40 +84,49 @@ test)
         compile "$cpp" dev api -std=c++17 "${sanitize[@]}" bindings/c/tests/api.cpp
         compile "$cpp" dev api-codes -std=c++17 "${sanitize[@]}" -fno-exceptions -DSAPWISE_NO_EXCEPTIONS \
             bindings/c/tests/api.cpp
-        compile "$cpp" release bullet "${sanitize[@]}" "${bullet[@]}"
-        for program in pairs api api-codes bullet; do
+        compile "$cpp" dev bullet "${sanitize[@]}" "${bullet[@]}"
+        for program in pairs api api-codes "bullet 100"; do
             echo "c: $program by $c"
-            "$folder/$program"
+            # shellcheck disable=SC2086 # a program and its argument
+            "$folder/"$program
         done
     done
     rm -rf "$folder/cache"
     "$folder/api" "$folder/cache"
-    # The builds of a user.
+    echo "c: pairs under valgrind"
+    compile gcc dev pairs -std=c99 "$examples/pairs.c"
+    checked "$folder/pairs"
+    ;;
+install)
+    need "cmake libssl-dev meson ninja-build pkg-config valgrind" cmake meson ninja pkg-config valgrind
+    prefix=$folder/installed
+    installed
+    bytes=$(stat -L -c %s "$prefix/lib/libsapwise.so")
+    echo "c: the shared library has $bytes bytes"
+    [ "$bytes" -le 2300000 ] || fail "it has more than 2.3 MB"
     for how in cmake meson; do
-        rm -rf "$folder/$how"
+        rm -rf "${folder:?}/$how"
         if [ $how = cmake ]; then
-            cmake -G Ninja -S "$examples" -B "$folder/cmake" -DCMAKE_PREFIX_PATH="$folder/release" >/dev/null
+            cmake -G Ninja -S "$examples" -B "$folder/cmake" -DCMAKE_PREFIX_PATH="$prefix" >/dev/null
         else
-            PKG_CONFIG_PATH=$folder/release/lib/pkgconfig meson setup "$folder/meson" "$examples" >/dev/null
+            PKG_CONFIG_PATH=$prefix/lib/pkgconfig meson setup "$folder/meson" "$examples" >/dev/null
         fi
         ninja -C "$folder/$how" --quiet
         for program in pairs pairs-static bullet; do
             echo "c: $program by $how"
-            LD_LIBRARY_PATH=$folder/release/lib "$folder/$how/$program"
+            LD_LIBRARY_PATH=$prefix/lib "$folder/$how/$program"
         done
     done
     for program in pairs pairs-static; do
         echo "c: $program under valgrind"
-        LD_LIBRARY_PATH=$folder/release/lib valgrind --quiet --leak-check=full \
-            --show-leak-kinds=definite,indirect --errors-for-leak-kinds=definite,indirect \
-            --error-exitcode=1 "$folder/meson/$program"
+        LD_LIBRARY_PATH=$prefix/lib checked "$folder/meson/$program"
     done
     ;;
 overhead)
-    installed release
     # With the name of the function to count.
-    CARGO_PROFILE_RELEASE_STRIP=false \
-        cargo build --quiet --release --locked --manifest-path $manifest --example overhead
+    export CARGO_PROFILE_RELEASE_STRIP=false
+    built release
+    cargo build --quiet --release --locked --manifest-path $manifest --example overhead
     compile gcc release overhead -std=c99 bindings/c/benches/overhead.c
     # Instructions of the eight frames.
     count() {
@@ -122,12 +143,13 @@ overhead)
     done
     ;;
 bench)
-    installed release
+    need pkg-config pkg-config
+    built release
     compile g++ release bullet -O2 "${bullet[@]}"
     "$folder/bullet" --bench >"$folder/bench.csv"
     machine="$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -1) ($(nproc) cores)"
     known="$machine,$(date +%F),$(pkg-config --modversion bullet)"
     sed "1s/^/machine,date,bullet,/; 2,\$s/^/$known,/" "$folder/bench.csv" | tee results/c.csv
     ;;
-*) fail "usage: tools/c.sh [test|overhead|bench|header]" ;;
+*) fail "usage: tools/c.sh [test|install|overhead|bench|header]" ;;
 esac

@@ -1,7 +1,8 @@
 // Sapwise beside Bullet's broad phase.
 //
-//   bullet          a small world of Bullet's: in each frame, the pairs of its broad phase against those of a Space
-//   bullet --bench  10 000 moving boxes: the time of btDbvtBroadphase over that of sw_space_update, interleaved
+//   bullet [FRAMES]  a small world of Bullet's: in each frame, the pairs of its broad phase against those of a Space;
+//                    default: 400 frames
+//   bullet --bench   10 000 moving boxes: the time of btDbvtBroadphase over that of sw_space_update, interleaved
 #include <sapwise.hpp>
 
 #include <btBulletDynamicsCommon.h>
@@ -15,6 +16,7 @@
 #include <random>
 #include <set>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 namespace {
@@ -110,7 +112,7 @@ struct World {
     }
 };
 
-int compare() {
+int compare(std::size_t frames) {
     World world;
     std::mt19937 random(1);
     std::uniform_real_distribution<float> place(-8, 8);
@@ -124,7 +126,7 @@ int compare() {
         world.add(world.cube, 1, {place(random), 4 + place(random) / 2, place(random)}, group, mask);
     };
     for (int k = 0; k < 300; k++) drop();
-    std::size_t pairs = 0, frames = 400;
+    std::size_t pairs = 0;
     for (std::size_t frame = 0; frame < frames; frame++) {
         if (frame % 5 == 4) {
             world.remove(2 + random() % (world.bodies.size() - 2));
@@ -228,7 +230,8 @@ int bench() {
 
 int main(int argc, char **argv) {
     try {
-        return argc > 1 && std::strcmp(argv[1], "--bench") == 0 ? bench() : compare();
+        if (argc > 1 && std::strcmp(argv[1], "--bench") == 0) return bench();
+        return compare(argc > 1 ? std::stoul(argv[1]) : 400);
     } catch (const std::exception &error) {
         std::fprintf(stderr, "sapwise: %s\n", error.what());
         return 1;
