@@ -49,7 +49,7 @@ installed() {
         CARGO_TARGET_DIR=$root/target/tools CARGO_PROFILE_DEV_DEBUG=false \
             cargo install cargo-c --version '0.10.24+cargo-0.98.0' --locked --debug --quiet
     }
-    (cd bindings/c && cargo cinstall --quiet --locked --release --prefix "$prefix" --libdir "$prefix/lib")
+    (cd bindings/c && cargo cinstall --locked --release --prefix "$prefix" --libdir "$prefix/lib")
 }
 
 # Compiles one program against a library.
@@ -128,10 +128,10 @@ overhead)
     built release
     cargo build --quiet --release --locked --manifest-path $manifest --example overhead
     compile gcc release overhead -std=c99 bindings/c/benches/overhead.c
-    # Instructions of the eight frames.
+    # Instructions of the eight frames, without the linker's, which looks functions up when they are first called.
     count() {
-        valgrind --tool=callgrind "--callgrind-out-file=$folder/callgrind" --toggle-collect=measured_frame "$@" \
-            >"$folder/pairs" 2>/dev/null
+        LD_BIND_NOW=1 valgrind --tool=callgrind "--callgrind-out-file=$folder/callgrind" \
+            --toggle-collect=measured_frame "$@" >"$folder/pairs" 2>/dev/null
         sed -n 's/^\(totals\|summary\): //p' "$folder/callgrind" | head -1
     }
     for n in 100 100000; do
