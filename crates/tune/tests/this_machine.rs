@@ -233,19 +233,19 @@ fn a_drop_ends_the_thread() {
     assert_eq!(count(folder.path()), 0);
 }
 
-/// A registry whose `grid-sap@cpu1` comes from `make`.
-fn with_grid_sap(make: impl Fn() -> Result<Box<dyn BroadPhase>, Error> + Send + Sync + 'static) -> Arc<Registry> {
+/// A registry whose `bvh@cpu1` comes from `make`.
+fn with_bvh(make: impl Fn() -> Result<Box<dyn BroadPhase>, Error> + Send + Sync + 'static) -> Arc<Registry> {
     let mut registry = Registry::with_cores(1);
-    let strips: AlgorithmId = "grid-sap@cpu1".parse().unwrap();
-    let revision = registry.entries().iter().find(|e| e.id == strips).unwrap().revision;
-    registry.add(strips, revision, make);
+    let tree: AlgorithmId = "bvh@cpu1".parse().unwrap();
+    let revision = registry.entries().iter().find(|e| e.id == tree).unwrap().revision;
+    registry.add(tree, revision, make);
     Arc::new(registry)
 }
 
 #[test]
 fn a_panic_in_the_background_is_a_remark() {
     let folder = tempfile::tempdir().unwrap();
-    let registry = with_grid_sap(|| panic!("as the test wants"));
+    let registry = with_bvh(|| panic!("as the test wants"));
     let mut adaptive = start(&options(folder.path()).background(true).registry(registry));
     frames_until_it_came(&mut adaptive);
     assert_eq!((origin(&adaptive), adaptive.tuning().source), (Origin::Usual, Source::Default));
@@ -259,10 +259,10 @@ fn the_background_makes_the_algorithms_once() {
     static MADE: AtomicUsize = AtomicUsize::new(0);
     let folder = tempfile::tempdir().unwrap();
     let caller = std::thread::current().id();
-    let registry = with_grid_sap(move || {
+    let registry = with_bvh(move || {
         assert_ne!(std::thread::current().id(), caller);
         MADE.fetch_add(1, Relaxed);
-        Registry::with_cores(1).create(&"grid-sap@cpu1".parse().unwrap())
+        Registry::with_cores(1).create(&"bvh@cpu1".parse().unwrap())
     });
     let mut adaptive = start(&options(folder.path()).background(true).registry(registry));
     frames_until_it_came(&mut adaptive);
@@ -271,14 +271,14 @@ fn the_background_makes_the_algorithms_once() {
 
 /// What most programs do, except for the folder and the time.
 #[test]
-fn a_program_without_a_registry_gets_all_our_algorithms() {
+fn a_program_without_a_registry_gets_our_algorithms() {
     let folder = tempfile::tempdir().unwrap();
     let options = StartOptions::new().cache(Some(folder.path().to_owned())).measure(Some(Duration::ZERO));
     let mut adaptive = start(&options);
     frames_until_it_came(&mut adaptive);
     assert_eq!(origin(&adaptive), Origin::Probed, "{:?}", adaptive.setup());
     let known: Vec<String> = adaptive.tuning().algorithms().iter().map(ToString::to_string).collect();
-    for id in ["brute@cpu1", "sap@cpu1", "grid-sap@cpu1", "bvh@cpu1", "pair-cache@cpu1"] {
+    for id in ["brute@cpu1", "bvh@cpu1", "pair-cache@cpu1"] {
         assert!(known.iter().any(|k| k == id), "{known:?}");
     }
 }
