@@ -15,6 +15,10 @@ use crate::tuning::{Source, Tuning};
 /// A runner-up that costs at most this many times what the choice costs reserves its buffers.
 const WARM_WITHIN: f64 = 1.5;
 
+/// From this many boxes on a first frame is sampled: a sample then takes less than a frame, and a wrong choice may take
+/// many.
+const FIRST_SAMPLED: usize = 1000;
+
 /// The algorithms, the choice among them, and what is known of the frames.
 // A frame without a decision looks at what stands first and at the beginning of `tracker` alone: between two frames
 // of a program all of it leaves the caches, and ten lines of memory here and there take as long as some frames.
@@ -174,7 +178,7 @@ impl Runner {
         clock::counted::spend(clock::counted::DECISION_NS);
         self.catch_up();
         let is_first = self.choice.is_none() && self.running.is_none();
-        let spent_ns = if is_first && self.policy.has_steps() {
+        let spent_ns = if is_first && boxes.len() < FIRST_SAMPLED && self.policy.has_steps() {
             self.tracker.begin(boxes);
             self.choice = self.choose_among(|policy, load| policy.choose_first(load.objects));
             0.0
