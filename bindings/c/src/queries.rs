@@ -5,7 +5,7 @@ use crate::body::sw_body;
 use crate::boxes::{Boxes, corner, one};
 use crate::space::sw_space;
 use crate::status::{Failure, call, sw_status};
-use sapwise::{Ray, View};
+use sapwise::{Handle, Ray, View};
 use std::ffi::{c_int, c_void};
 
 /// Gets a handle that a query found. Returns 0 for no more.
@@ -43,6 +43,16 @@ fn given<T>(callback: Option<T>) -> Result<T, Failure> {
     callback.ok_or_else(|| Failure::null("the callback"))
 }
 
+/// Passes handles to a callback until it returns 0.
+///
+/// # Safety
+/// The callback may be called with `user`.
+unsafe fn each(found: sw_found, user: *mut c_void) -> Result<impl FnMut(Handle), Failure> {
+    let (found, mut goes_on) = (given(found)?, true);
+    // SAFETY: of the caller.
+    Ok(move |handle: Handle| goes_on = goes_on && unsafe { found(user, handle.to_bits()) } != 0)
+}
+
 /// Calls `found` for each body whose box overlaps these bounds. After 0 there are no more calls. SW_INVALID_BOX,
 /// SW_OUT_OF_MEMORY.
 ///
@@ -58,10 +68,8 @@ pub unsafe extern "C-unwind" fn sw_space_query_box(
     // SAFETY: of the caller.
     unsafe {
         query(space, by, |view| {
-            let (found, mut goes_on) = (given(found)?, true);
-            Ok(view.query_box(one(bounds, "bounds")?, |handle| {
-                goes_on = goes_on && found(user, handle.to_bits()) != 0;
-            })?)
+            let found = each(found, user)?;
+            Ok(view.query_box(one(bounds, "bounds")?, found)?)
         })
     }
 }
@@ -107,10 +115,8 @@ pub unsafe extern "C-unwind" fn sw_space_query_point(
     // SAFETY: of the caller.
     unsafe {
         query(space, by, |view| {
-            let (found, mut goes_on) = (given(found)?, true);
-            Ok(view.query_point(corner(point, "point")?, |handle| {
-                goes_on = goes_on && found(user, handle.to_bits()) != 0;
-            })?)
+            let found = each(found, user)?;
+            Ok(view.query_point(corner(point, "point")?, found)?)
         })
     }
 }
