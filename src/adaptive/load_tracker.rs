@@ -72,11 +72,11 @@ impl LoadTracker {
 
     /// Sets the load to that of a first frame, of which only the number of boxes is known.
     pub(super) fn begin(&mut self, boxes: &[Aabb]) {
-        self.load = Load { objects: count(boxes), ..Load::default() }.with_moved(1.0).with_moved_share(1.0);
+        self.load = Load::of_objects(count(boxes)).with_motion(Motion::MOST);
         self.watch = Watch::Due;
     }
 
-    /// Brings the load up to date. Returns the nanoseconds of samples and looks: they have a budget of their own.
+    /// Brings the load up to date. Returns the nanoseconds of the sample, if one was due: it has a budget of its own.
     pub(super) fn update(&mut self, boxes: &[Aabb]) -> f64 {
         let started = Instant::now();
         let objects = count(boxes);
@@ -134,7 +134,7 @@ impl LoadTracker {
     /// Takes in a frame that needed no decision.
     pub(super) fn went_on(&mut self, boxes: &[Aabb], pairs: u64, epoch: &Epoch) {
         self.pace.ran(count(boxes), pairs);
-        if self.watch == Watch::Watching && self.look(boxes) {
+        if self.look(boxes) {
             self.pace.wake();
         }
         if epoch.is_off(self.pace.rest_ns()) {
