@@ -59,7 +59,7 @@ impl Epoch {
         self.work += work.map_or(1.0, |work| work.over_mean);
     }
 
-    /// Whether the times are so far from the expectation that it is too early to rest for `rest_ns`.
+    /// Whether a decision is needed early: the times are far from the expectation, and a share of `rest_ns` has passed.
     pub(super) fn is_off(&self, rest_ns: f64) -> bool {
         let mean_ns = self.ns / f64::from(self.timed.max(1));
         if self.timed < ENOUGH || mean_ns * f64::from(self.frames) < EARLIEST * rest_ns {

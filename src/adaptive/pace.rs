@@ -6,8 +6,8 @@ const SHARE: f64 = 0.004;
 pub(super) const SHARE_OF_DRIFT: f64 = 0.02;
 /// Most frames between two decisions.
 const MOST_FRAMES: f64 = 1024.0;
-/// A number of objects that differs from the previous frame's by more than this part and by more than so many calls
-/// for a decision at once.
+/// A jump in the number of objects calls for a decision at once: by more than this part of the previous frame's number,
+/// and by more than this many objects.
 const JUMP_PART: u32 = 4;
 const JUMP_LEAST: u32 = 16;
 /// Weight of a decision in the mean of what they take, and how many times the mean it counts at most.

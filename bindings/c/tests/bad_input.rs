@@ -62,7 +62,7 @@ fn wrong_arrays_are_found_before_they_are_read() {
     let (space, handles) = space();
     let boxes = [0.0_f32; 64].as_ptr();
     let insert = |boxes, n, stride, max| {
-        // SAFETY: there are fewer boxes than it is told, but an error comes first.
+        // SAFETY: an array may be shorter than n boxes, but the call fails before it reads one.
         unsafe { sw_space_insert_many(space, boxes, n, stride, max, null(), handles.as_ptr().cast_mut()) }
     };
     for (stride, max, least) in [(23, null(), 24), (26, null(), 24), (8, boxes, 12), (usize::MAX, null(), 24)] {

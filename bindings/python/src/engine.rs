@@ -28,7 +28,7 @@ const MOST_THREADS: u32 = 16;
 /// Largest call whose buffers are kept for the next: a few hundred megabytes.
 const MOST_BOXES_KEPT: usize = 2_000_000;
 const MOST_PAIRS_KEPT: usize = 16_000_000;
-/// Most engines that are kept: one for each of so many threads that call at once.
+/// Most engines that are kept, one for each thread that calls at the same time.
 const MOST_KEPT: usize = 8;
 
 /// A call.

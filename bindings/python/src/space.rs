@@ -273,8 +273,8 @@ impl PySpace {
     /// Raises
     /// ------
     /// TooManyPairsError, MemoryError, SapwiseError
-    ///     More pairs than ``limit``, no memory, or no algorithm can run. The next update compares with the last one that
-    ///     succeeded.
+    ///     More pairs than ``limit``, no memory, or no algorithm can run. The next update compares with the last one
+    ///     that succeeded.
     fn update(&self, py: Python<'_>) -> PyResult<()> {
         py.check_signals()?;
         self.change(py, &[], &[], Space::update)?;

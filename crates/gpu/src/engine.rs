@@ -277,7 +277,7 @@ impl Engine {
         self.submit(view, params, [0; 2])
     }
 
-    /// Submits a frame. `view` holds so many bytes of boxes and of their numbers: none if the boxes are on the GPU.
+    /// Submits a frame. `boxes` and `ids` are their bytes in `view`, both 0 if the boxes are on the GPU.
     fn submit(
         &mut self,
         mut view: wgpu::BufferViewMut,
