@@ -407,7 +407,7 @@ mod tests {
     }
 
     #[test]
-    fn margin_after_a_pause_follows_the_new_motion() {
+    fn margin_after_frames_of_others_follows_the_new_motion() {
         let mut method = pair_cache(&[1], &Threads::default(), Simd::Portable, false).unwrap();
         let moving = *kept(&mut method, (0..160).map(to_and_fro), true).last().unwrap();
         // As after a hundred frames of another method, in which all boxes went elsewhere.

@@ -26,17 +26,6 @@ const KEPT_OVER_PROMISED: f32 = 4.0;
 /// stacked a hair apart, and any margin would seem free.
 const FEWEST_PAIRS: f32 = 0.5;
 
-/// Frames from scratch after keeping did not pay, at first and at most.
-const PAUSE: [u32; 2] = [16, 512];
-
-/// Where boxes moved too far for it, the pause is over as soon as they move by less than this share of that. Every so
-/// many frames it is looked. Boxes that move by less than the second are as good as still. Only where keeping went on
-/// for so many frames before: else what was looked at by chance would begin again and again what does not pay.
-const CALMER: f32 = 0.5;
-const STILL: f32 = 0.005;
-const LOOK: u32 = 4;
-const KEPT_WELL: u32 = 32;
-
 /// Frames over which the shares that decide the margin are averaged, and by how much it changes in a frame. After all
 /// boxes got new grown boxes none leaves for some frames: a margin that followed at once would swing.
 const LEARNING: f32 = 64.0;
@@ -87,15 +76,6 @@ pub(super) struct Motion {
     /// Pairs for each box in the last frame; `None` before the first.
     density: Option<f32>,
     keeping: Option<Keeping>,
-    /// Frames for which nothing is kept, and how many that will be the next time.
-    pause: u32,
-    next_pause: u32,
-    /// The pause is over as soon as boxes move less than the most that they moved when it began, as far as that was
-    /// told, and at its looks.
-    ends_early: bool,
-    paused_at: f32,
-    /// Keeping ceased to pay for its many pairs, and not for how far boxes move.
-    crowded: bool,
     /// How far they move in this frame, where that was told.
     told: Option<f32>,
     /// No larger margin is begun with: that one kept too many pairs, of boxes near one another that do not overlap
@@ -170,11 +150,6 @@ impl Motion {
             displacement: Displacement::default(),
             density: None,
             keeping: None,
-            pause: 0,
-            next_pause: PAUSE[0],
-            ends_early: false,
-            paused_at: 0.0,
-            crowded: false,
             told: None,
             most_margin: MARGINS[MARGINS.len() - 1],
             prices: Prices::new(timed),
@@ -202,31 +177,20 @@ impl Motion {
         self.prices.add_scratch(took, cost::scratch(cost::far(objects), self.density.unwrap_or_default()));
     }
 
-    /// Keeping failed, because there were too many pairs to keep or because it did not pay; it will not be tried for
-    /// some frames.
+    /// Keeping failed, because there were too many pairs to keep or because it did not pay.
     pub(super) fn stop(&mut self, too_many: bool) {
-        let kept = self.keeping.take();
-        let crowded = kept.filter(|failed| too_many || failed.tests > 0.5 * failed.cost);
-        let well = kept.is_some_and(|kept| kept.frames >= KEPT_WELL);
-        self.crowded = crowded.is_some();
-        (self.ends_early, self.paused_at) = (well && !self.crowded, kept.map_or(0.0, |kept| kept.pace));
-        if let Some(failed) = crowded {
+        let Some(failed) = self.keeping.take() else { return };
+        if too_many || failed.tests > 0.5 * failed.cost {
             self.most_margin = (0.5 * failed.margin.share).max(MARGINS[0]);
         }
-        self.pause = self.next_pause;
-        self.next_pause = (self.next_pause * 2).min(PAUSE[1]);
+        self.prices.failed(failed.cost, too_many);
     }
 
-    /// Other algorithms ran so many frames since the last one of this. They count for the pause, and where no crowd
-    /// caused it, it is over if boxes move less by now: a method that has its turn for a few frames at a time would
-    /// never get to its end.
+    /// Other algorithms ran this many frames since the last one of this.
     pub(super) fn missed(&mut self, frames: u64) {
         // Of boxes before all of these.
         self.displacement = Displacement::default();
-        let left = u64::from(self.pause).saturating_sub(frames) as u32;
-        // So that the next frame looks.
-        self.pause = left.checked_sub(1).map_or(0, |left| left - left % LOOK + 1);
-        self.ends_early = !self.crowded;
+        self.prices.fade(frames);
     }
 
     /// The number of boxes has changed by a factor of two or more: what a box costs is to be learned again.
@@ -348,7 +312,7 @@ impl Motion {
         k.pace = self.told.unwrap_or(k.pace);
         k.frames = k.frames.saturating_add(1);
         if k.frames == PROVEN {
-            (self.next_pause, self.most_margin) = (PAUSE[0], MARGINS[MARGINS.len() - 1]);
+            self.most_margin = MARGINS[MARGINS.len() - 1];
         }
         self.prices.pays(took, k.cost, scratch)
     }
@@ -362,27 +326,8 @@ impl Motion {
         Some((moved as f32, density))
     }
 
-    /// Whether boxes move so much less than when keeping ceased to pay that it may pay again.
-    fn is_calmer(&mut self, plan: &FramePlan, boxes: &[Aabb]) -> bool {
-        if !self.ends_early || !self.pause.is_multiple_of(LOOK) {
-            return false;
-        }
-        let Some(moved) = plan.moved().or_else(|| self.displacement.motion(boxes).map(|m| m.moved)) else {
-            return false;
-        };
-        self.paused_at = self.paused_at.max(moved as f32);
-        (moved as f32) < (CALMER * self.paused_at).max(STILL)
-    }
-
     /// Begins to keep pairs if that promises to pay.
     fn begin(&mut self, plan: &FramePlan, boxes: &[Aabb]) -> Option<Keeping> {
-        if self.pause > 0 {
-            self.pause -= 1;
-            if !self.is_calmer(plan, boxes) {
-                return None;
-            }
-            self.pause = 0;
-        }
         let (motion, density) = self.known(plan, boxes)?;
         self.density = Some(density);
         let far = cost::far(boxes.len());
@@ -393,10 +338,9 @@ impl Motion {
         let margins = MARGINS.into_iter().filter(|&m| m <= self.most_margin);
         let best = margins.min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(MARGINS[0]);
         let kept = kept(best);
-        if !self.prices.promises(cost(best), scratch) || kept >= MOST_KEPT {
+        if kept >= MOST_KEPT || !self.prices.begins(cost(best), scratch) {
             return None;
         }
-        self.prices.begin();
         Some(Keeping {
             margin: Margin { share: best, longest_edge: longest_edge(plan, boxes) },
             pace: motion,

@@ -7,10 +7,19 @@ const FEWEST_FRAMES: u32 = 3;
 
 /// Keeping stops when it has cost this many frames from scratch more than finding as many from scratch. To begin costs
 /// one or two.
-const MOST_LOST: f32 = 6.0;
+const MOST_LOST: f32 = 4.0;
 
 /// One frame counts as at most this many from scratch: an interruption by the system says nothing.
 const MOST_OF_FRAME: f32 = 4.0;
+
+/// After a failure, keeping must promise to cost this many times less than finding from scratch.
+const WARY: f32 = 1.1;
+
+/// If too many pairs had to be kept, that counts as this many times the cost of finding them from scratch.
+const CROWDED: f32 = 2.0;
+
+/// Frames without kept pairs over which what a failure has shown falls to an e-th.
+const FORGETTING: f32 = 512.0;
 
 /// Measured costs of a box in nanoseconds, over what the cost model says of the frame. The model's constants are those
 /// of another machine, but it knows how costs change with the scene.
@@ -24,16 +33,23 @@ pub(super) struct Prices {
     scratch: MeanTime,
     /// Cost of keeping beyond that of frames from scratch, in such frames, since it was last below.
     lost: f32,
+    /// What the model said of keeping and of finding from scratch when keeping began.
+    promised: [f32; 2],
+    /// Sum and number of the frames since, without the first, which builds.
+    kept: [f32; 2],
+    /// Measured cost of keeping over the promised one when it last failed.
+    over: f32,
 }
 
 impl Prices {
     pub(super) fn new(timed: bool) -> Self {
-        Self { timed, frames: 0, scratch: MeanTime::default(), lost: 0.0 }
+        let scratch = MeanTime::default();
+        Self { timed, frames: 0, scratch, lost: 0.0, promised: [0.0; 2], kept: [0.0; 2], over: 1.0 }
     }
 
-    /// Forgets all that was learned.
+    /// Forgets what a box costs, and not how keeping and finding from scratch compare.
     pub(super) fn forget(&mut self) {
-        *self = Self::new(self.timed);
+        *self = Self { over: self.over, ..Self::new(self.timed) };
     }
 
     /// Learns from a frame from scratch, of which the model says `model`.
@@ -45,18 +61,35 @@ impl Prices {
         self.scratch.add(f64::from(took / model));
     }
 
-    /// Returns whether keeping is worth a try. The clock ends a try that does not pay.
-    pub(super) fn promises(&self, keeping: f32, scratch: f32) -> bool {
-        keeping < scratch && (!self.timed || self.frames >= FEWEST_FRAMES)
+    /// Whether keeping is worth a try, by what the model says. The clock ends a try that does not pay; what it has shown
+    /// then counts, less and less, for the next ones.
+    pub(super) fn begins(&mut self, keeping: f32, scratch: f32) -> bool {
+        let begins = self.over * keeping < scratch && (!self.timed || self.frames >= FEWEST_FRAMES);
+        if begins {
+            // The frame that builds is not counted.
+            (self.lost, self.promised, self.kept) = (0.0, [keeping, scratch], [0.0, -1.0]);
+        }
+        self.fade(1);
+        begins
+    }
+
+    /// Frames go by in which no pairs are kept.
+    pub(super) fn fade(&mut self, frames: u64) {
+        self.over = 1.0 + (self.over - 1.0) * (-(frames as f32) / FORGETTING).exp();
     }
 
     fn of_scratch(&self) -> f32 {
         self.scratch.get().unwrap_or(1.0) as f32
     }
 
-    /// Keeping begins.
-    pub(super) fn begin(&mut self) {
-        self.lost = 0.0;
+    /// Keeping did not pay, which costs `model` by the model, or there were too many pairs.
+    pub(super) fn failed(&mut self, model: f32, too_many: bool) {
+        let cost = match self.kept {
+            _ if too_many => CROWDED * self.promised[1],
+            [sum, frames] if frames > 0.0 => sum / frames / self.of_scratch(),
+            _ => model,
+        };
+        self.over = (WARY * cost / self.promised[0]).max(1.0);
     }
 
     /// Learns from a frame with kept pairs. `keeping` and `scratch`: what the model says. Returns whether to go on.
@@ -64,7 +97,12 @@ impl Prices {
         if !self.timed {
             return keeping < scratch;
         }
-        let over = (took / (scratch * self.of_scratch())).min(MOST_OF_FRAME) - 1.0;
+        let scratch = scratch * self.of_scratch();
+        self.kept[1] += 1.0;
+        if self.kept[1] > 0.0 {
+            self.kept[0] += took.min(MOST_OF_FRAME * scratch);
+        }
+        let over = (took / scratch).min(MOST_OF_FRAME) - 1.0;
         // NaN, of 0 over 0, counts as 0.
         self.lost = (self.lost + over).max(0.0);
         self.lost <= MOST_LOST
@@ -76,14 +114,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn keeping_is_tried_after_three_frames_and_stops_when_it_has_lost_six() {
+    fn keeping_is_tried_after_three_frames_and_stops_when_it_has_lost_four() {
         let mut prices = Prices::new(true);
         for _ in 0..3 {
-            assert!(!prices.promises(10.0, 40.0));
+            assert!(!prices.begins(10.0, 40.0));
             prices.add_scratch(50.0, 40.0);
         }
-        assert!(prices.promises(39.0, 40.0) && !prices.promises(41.0, 40.0));
-        prices.begin();
+        assert!(!prices.begins(41.0, 40.0) && prices.begins(39.0, 40.0));
         // The first frame builds. Then half a frame is saved in each.
         assert!(prices.pays(150.0, 10.0, 40.0));
         assert!((0..1000).all(|k| prices.pays(if k % 50 == 0 { 150.0 } else { 25.0 }, 10.0, 40.0)));
@@ -91,16 +128,33 @@ mod tests {
         assert!(prices.pays(5000.0, 10.0, 40.0));
         assert!((0..10).all(|_| prices.pays(25.0, 10.0, 40.0)));
         let frames = (0..1000).take_while(|_| prices.pays(55.0, 10.0, 40.0)).count();
-        assert!((50..70).contains(&frames), "{frames}");
+        assert!((30..50).contains(&frames), "{frames}");
         // In a denser scene both cost more.
-        prices.begin();
+        assert!(prices.begins(60.0, 80.0));
         assert!((0..1000).all(|_| prices.pays(90.0, 60.0, 80.0)));
+    }
+
+    #[test]
+    fn a_failure_counts_for_the_next_promises() {
+        let mut prices = Prices::new(true);
+        (0..10).for_each(|_| prices.add_scratch(50.0, 40.0));
+        assert!(prices.begins(30.0, 40.0));
+        while prices.pays(60.0, 30.0, 40.0) {}
+        prices.failed(30.0, false);
+        // Kept pairs cost 48 of these where 30 were promised.
+        assert!(!prices.begins(30.0, 40.0) && !prices.begins(23.0, 40.0) && prices.clone().begins(22.0, 40.0));
+        let frames = (0..10_000).take_while(|_| !prices.begins(30.0, 40.0)).count();
+        assert!((300..700).contains(&frames), "{frames}");
+        prices.failed(30.0, true);
+        assert!(!prices.begins(19.0, 40.0));
+        prices.fade(10_000);
+        assert!(prices.begins(39.0, 40.0));
     }
 
     #[test]
     fn without_a_clock_the_model_decides() {
         let mut prices = Prices::new(false);
-        assert!(prices.promises(39.0, 40.0) && !prices.promises(41.0, 40.0));
+        assert!(prices.begins(39.0, 40.0) && !prices.begins(41.0, 40.0));
         assert!(prices.pays(1.0e9, 39.0, 40.0) && !prices.pays(0.0, 41.0, 40.0));
     }
 }
