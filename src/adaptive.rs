@@ -1,6 +1,5 @@
 //! The in-line module: the cheapest algorithm for this frame, chosen before it runs.
 
-mod breaker;
 mod decision;
 mod epoch;
 mod instances;

@@ -4,7 +4,7 @@
 //! under test.
 
 use crate::Aabb;
-pub(crate) use sapwise_scenes::{Course, Scenario};
+pub(crate) use sapwise_scenes::Scenario;
 
 /// A scene with the box type of the library under test.
 pub(crate) struct Scene {

@@ -29,6 +29,9 @@ const OBJECTS_OF_A_THREAD_SQUARED: u32 = 2500;
 /// The most threads of [`Tuning::usual`]. Sixteen begin at 640 000 objects, where memory bandwidth bounds a frame.
 const MOST_USUAL_THREADS: u32 = 16;
 
+/// Methods on the CPU that [`Tuning::for_running`] replaces by `pair-cache`.
+const REPLACED: [&str; 3] = ["sap", "grid-sap", "bvh"];
+
 /// Which algorithm to run under which load, and where that knowledge came from.
 ///
 /// With cost curves the choice depends on the whole [`Load`]. Without them it depends on the number of objects, through
@@ -226,22 +229,28 @@ impl Tuning {
         self.costs.iter().map(|c| &c.algorithm).collect()
     }
 
-    /// The tuning without the costs of `sap` and `grid-sap` on the CPU, which a choice among the others does without:
-    /// over the reports of `datasets/` the best of the others takes 1.001 to 1.004 times the best of all (1.015 at the
-    /// portable SIMD level). Unchanged if it has no `bvh`, or no costs.
+    /// The tuning with `brute` and `pair-cache` as the only built-in methods on the CPU. `pair-cache` chooses by its
+    /// own times between kept pairs and a tree from scratch, which is `bvh`; over the reports of `datasets/` the best
+    /// of the others takes 1.001 to 1.004 times the best of all without `sap` and `grid-sap` (1.015 at the portable
+    /// SIMD level). Unchanged without costs of `bvh` and of
+    /// `pair-cache` on the same numbers of threads.
     #[must_use]
     pub fn for_running(mut self) -> Self {
-        let is_cpu = |id: &AlgorithmId| id.backend().class() == BackendClass::Cpu;
-        if self.costs.iter().any(|c| is_cpu(&c.algorithm) && c.algorithm.method() == "bvh") {
-            self.costs.retain(|c| !is_cpu(&c.algorithm) || !["sap", "grid-sap"].contains(&c.algorithm.method()));
-            let left: Vec<AlgorithmId> = self.costs.iter().map(|c| c.algorithm.clone()).collect();
-            // In the field of one that went, the step below goes on.
-            self.steps.retain(|step| left.contains(&step.algorithm));
-            self.crossovers.retain(|c| left.contains(&c.below) && left.contains(&c.above));
-            if let Some(first) = self.steps.first_mut() {
-                first.from_objects = 0;
-            }
+        let stand_in = |id: &AlgorithmId| {
+            let replaced = id.backend().class() == BackendClass::Cpu && REPLACED.contains(&id.method());
+            replaced.then(|| AlgorithmId::cpu("pair-cache", id.threads()))
+        };
+        let known = |id: &AlgorithmId| self.costs.iter().any(|c| c.algorithm == *id);
+        let has_bvh = self.costs.iter().any(|c| c.algorithm.method() == "bvh");
+        if !(has_bvh && self.costs.iter().filter_map(|c| stand_in(&c.algorithm)).all(|id| known(&id))) {
+            return self;
         }
+        self.costs.retain(|c| stand_in(&c.algorithm).is_none());
+        for step in &mut self.steps {
+            step.algorithm = stand_in(&step.algorithm).unwrap_or_else(|| step.algorithm.clone());
+        }
+        self.steps.dedup_by(|step, before| step.algorithm == before.algorithm);
+        self.crossovers.retain(|c| [&c.below, &c.above].iter().all(|id| stand_in(id).is_none()));
         self
     }
 

@@ -21,9 +21,6 @@ pub enum Reason {
     Explored,
     /// The one that was chosen failed in this frame.
     FellBack,
-    /// A frame of the one before cost far more than was expected of it: this one is the cheapest of the others, most
-    /// often a tree, whose cost does not depend on where the boxes lie.
-    Sheltered,
 }
 
 impl fmt::Display for Reason {
@@ -35,7 +32,6 @@ impl fmt::Display for Reason {
             Self::Switched => "cheaper than the one before by more than the switch costs",
             Self::Explored => "not the cheapest, tried to learn what it costs",
             Self::FellBack => "in place of one that failed",
-            Self::Sheltered => "in place of one that took far longer than expected",
         })
     }
 }

@@ -1,10 +1,8 @@
 //! Which algorithm runs the next frame: the one with the lowest predicted cost times what frames have shown.
 //!
 //! Frames show two factors, one for the class of processor and one for the candidate. A switch waits until it would
-//! have saved its price. Rare trials learn what others cost. A circuit breaker suspends a method after a frame that
-//! cost far too much.
+//! have saved its price. Rare trials learn what others cost.
 
-use super::breaker::Breaker;
 use super::decision::{Choice, Reason};
 use super::epoch::Epoch;
 use super::part::Part;
@@ -23,11 +21,9 @@ const STEP_SLACK: f64 = 0.05;
 
 /// First frame of a candidate over a usual one: its memory is in no cache, its threads sleep.
 const COLD: f64 = 1.15;
-/// First frame of an incremental algorithm over a frame of the tree, and frames of absence after which it is one.
-const FROM_NOTHING: f64 = 2.0;
+/// First frame of an incremental algorithm over a mean one, and frames of absence after which it is one.
+const FROM_NOTHING: f64 = 3.0;
 const FORGOTTEN: u64 = 3;
-/// The method whose cost depends on the numbers of boxes and pairs alone.
-const TREE: &str = "bvh";
 
 /// Standard deviations of the logarithm of a factor before any observation: of a class of processor, of a candidate.
 const CLASS_LN: f64 = 0.32;
@@ -75,7 +71,6 @@ struct Candidate {
     method: usize,
     class: usize,
     width: u32,
-    is_tree: bool,
     own: Part,
     /// Observed epochs, and the position of its number of threads among the waits.
     observed: u32,
@@ -102,7 +97,6 @@ pub(super) struct Policy {
     candidates: Vec<Candidate>,
     tangents: Tangents,
     classes: Vec<Part>,
-    breakers: Vec<Breaker>,
     kept: Vec<Kept>,
     /// The candidate of each step.
     steps: Vec<usize>,
@@ -122,7 +116,7 @@ pub(super) struct Policy {
     decided: u64,
     /// Objects at the last decision.
     objects: u32,
-    /// Most frames until the next decision while a switch or a suspension is pending.
+    /// Most frames until the next decision while a switch is pending.
     rest: Option<f64>,
     decision_ns: f64,
 }
@@ -139,7 +133,6 @@ impl Policy {
             method: number(&mut methods, id.method()),
             class: number(&mut classes, id.backend().class()),
             width: id.backend().width(),
-            is_tree: id.method() == TREE,
             own: Part::new(OWN_LN),
             observed: 0,
             wait: number(&mut widths, (id.backend().class(), id.backend().width())),
@@ -151,7 +144,6 @@ impl Policy {
             candidates: candidates.collect(),
             classes: vec![Part::new(CLASS_LN); classes.len()],
             tangents: Tangents::new(tuning.costs.len()),
-            breakers: vec![Breaker::new(); methods.len()],
             kept: states(kept),
             steps: tuning.steps.iter().filter_map(|s| ids.iter().position(|id| **id == s.algorithm)).collect(),
             learns: true,
@@ -254,23 +246,17 @@ impl Policy {
             return self.choose_by_count(load.objects);
         }
         self.expect(load);
-        let best = self.cheapest(|k| !self.is_suspended(k)).or_else(|| self.cheapest(|_| true))?;
+        let best = self.cheapest(|_| true)?;
         let (incumbent, reason) = match self.incumbent {
             None if self.ran.is_none() => (best, Reason::First),
             None => (best, Reason::FellBack),
-            Some(k) if self.is_suspended(k) => (best, Reason::Sheltered),
             Some(k) => self.settle(k, best, frames),
         };
-        if let Some(k) = self.cheapest(|_| true).filter(|&k| self.is_suspended(k)) {
-            let lasts = (self.breaker(k).until - self.frame) as f64;
-            self.rest = Some(self.rest.map_or(lasts, |rest| rest.min(lasts)));
-        }
         if self.incumbent != Some(incumbent) {
             self.appoint(incumbent);
         }
         self.trials.earn(frames * self.candidates[incumbent].mean_ns);
-        let goes_on = |k: usize| reason == Reason::Stayed && !self.is_suspended(k);
-        self.trials.running = self.trials.running.filter(|trial| !trial.is_over() && goes_on(trial.candidate));
+        self.trials.running = self.trials.running.filter(|trial| !trial.is_over() && reason == Reason::Stayed);
         if reason == Reason::Stayed && self.learns && self.explores {
             self.offer_trial(incumbent);
         }
@@ -314,15 +300,6 @@ impl Policy {
         c.mean_ns = c.predicted_ns * factor + self.waits[c.wait].ns(self.frame);
     }
 
-    fn breaker(&self, candidate: usize) -> &Breaker {
-        &self.breakers[self.candidates[candidate].method]
-    }
-
-    /// Whether the circuit breaker keeps a candidate from the next frame.
-    fn is_suspended(&self, candidate: usize) -> bool {
-        self.breaker(candidate).until > self.frame
-    }
-
     fn cheapest(&self, among: impl Fn(usize) -> bool) -> Option<usize> {
         let usable = (0..self.candidates.len()).filter(|&k| self.candidates[k].usable && among(k));
         usable.min_by(|&a, &b| self.candidates[a].mean_ns.total_cmp(&self.candidates[b].mean_ns))
@@ -342,12 +319,7 @@ impl Policy {
     /// Expected nanoseconds of a first frame of a candidate.
     fn first_ns(&self, candidate: usize) -> f64 {
         let c = &self.candidates[candidate];
-        if c.kept.is_none() {
-            return COLD * c.mean_ns;
-        }
-        let same = |other: &&Candidate| other.is_tree && other.class == c.class && other.width == c.width;
-        let tree_ns = self.candidates.iter().find(same).map_or(c.mean_ns, |tree| tree.mean_ns);
-        FROM_NOTHING * tree_ns.max(c.mean_ns)
+        c.mean_ns * if c.kept.is_some() { FROM_NOTHING } else { COLD }
     }
 
     /// Extra nanoseconds of the first frame of a candidate, if it ran next.
@@ -377,7 +349,7 @@ impl Policy {
         let pays = |k: usize| {
             let gain_ns = now_ns - self.candidates[k].mean_ns;
             let saved_ns = self.candidates[k].saved_ns.max(SOON * gain_ns);
-            gain_ns > 0.0 && saved_ns >= self.price_ns(incumbent, k) && !self.is_suspended(k)
+            gain_ns > 0.0 && saved_ns >= self.price_ns(incumbent, k)
         };
         if let Some(k) = self.cheapest(pays) {
             return (k, Reason::Switched);
@@ -388,8 +360,8 @@ impl Policy {
         (incumbent, Reason::Hysteresis)
     }
 
-    /// Frames until the next decision, at least and at most: a trial is not disturbed, and a pending switch or the end
-    /// of a suspension not missed.
+    /// Frames until the next decision, at least and at most: a trial is not disturbed, and a pending switch not
+    /// missed.
     pub(super) fn rest(&self) -> (f64, f64) {
         let least = self.trials.running.map_or(0.0, |trial| f64::from(trial.left) + 1.0);
         (least, self.rest.unwrap_or(f64::INFINITY))
@@ -412,7 +384,7 @@ impl Policy {
         let offer = |k: usize| {
             let c = &self.candidates[k];
             let dear = c.mean_ns > HOPELESS * now_ns;
-            if k == incumbent || !c.usable || dear || self.is_suspended(k) || !self.is_near(k, incumbent) {
+            if k == incumbent || !c.usable || dear || !self.is_near(k, incumbent) {
                 return None;
             }
             let frames = match (self.shares(k, incumbent), c.kept) {
@@ -447,14 +419,14 @@ impl Policy {
     }
 
     /// Takes in a frame of a candidate that was decided, stood out or belongs to a trial, and adds it to the epoch if
-    /// it shows a usual cost. Returns whether the circuit breaker tripped.
-    pub(super) fn ran(&mut self, candidate: usize, ns: f64, work: Option<FrameWork>, epoch: &mut Epoch) -> bool {
+    /// it shows a usual cost.
+    pub(super) fn ran(&mut self, candidate: usize, ns: f64, work: Option<FrameWork>, epoch: &mut Epoch) {
         let frame = self.frame + u64::from(epoch.frames);
         let entered = self.ran.replace(candidate) != Some(candidate);
         let remembered = self.remembers(candidate);
         let first_ns = self.first_ns(candidate);
         let c = &self.candidates[candidate];
-        let (is_tree, method, kept, observed, wait) = (c.is_tree, c.method, c.kept, c.observed, c.wait);
+        let (kept, observed, wait) = (c.kept, c.observed, c.wait);
         let now_ns = self.incumbent.map_or(0.0, |k| self.candidates[k].mean_ns);
         let over_mean = match (self.trials.running, self.incumbent, work) {
             // A rebuild of shared state would have come with the incumbent, too.
@@ -472,13 +444,6 @@ impl Policy {
         if !entered || cold || remembered {
             epoch.count((ns - waited_ns) / if cold { COLD } else { 1.0 }, work);
         }
-        let trees = self.candidates.iter().filter(|c| c.usable && c.is_tree).map(|c| c.mean_ns);
-        let tree_ns = trees.min_by(f64::total_cmp).filter(|&ns| ns > 0.0 && !is_tree);
-        let trips = tree_ns.is_some_and(|tree_ns| self.breakers[method].trips(frame, ns, first_ns, tree_ns));
-        if trips {
-            self.trials.running = None;
-        }
-        trips
     }
 
     /// Takes in an epoch of a candidate, whose last frame came about by `work`.

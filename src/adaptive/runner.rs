@@ -305,7 +305,7 @@ impl Runner {
         if self.epoch.frames == 0 {
             self.epoch = self.policy.epoch(choice.chosen);
         }
-        let trips = self.policy.ran(choice.chosen, ns, self.work, &mut self.epoch);
+        self.policy.ran(choice.chosen, ns, self.work, &mut self.epoch);
         self.epoch.frames += 1;
         let began = self.epoch.frames == 1 && !matches!(choice.reason, Reason::Stayed | Reason::Hysteresis);
         if began {
@@ -313,7 +313,7 @@ impl Runner {
         }
         self.tracker.pace.set_rest(ns, self.policy.rest());
         // A first frame, and one that replaced another, were chosen by little knowledge.
-        if trips || matches!(choice.reason, Reason::First | Reason::FellBack) {
+        if matches!(choice.reason, Reason::First | Reason::FellBack) {
             self.tracker.pace.wake();
         }
         self.warm_runner_up(boxes.len());

@@ -60,7 +60,6 @@ fn name(reason: Reason) -> &'static str {
         Reason::Switched => "switched",
         Reason::Explored => "explored",
         Reason::FellBack => "fell_back",
-        Reason::Sheltered => "sheltered",
         _ => "other",
     }
 }

@@ -8,8 +8,8 @@
 use super::*;
 use crate::broad_phase::{FrameKind, FrameWork};
 use crate::clock::counted;
-use crate::scene::Course;
 use crate::stats::{mean, median};
+use sapwise_scenes::Course;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -90,10 +90,9 @@ impl Trace {
         self.ids.iter().position(|i| i.to_string() == id).unwrap()
     }
 
-    /// The time of the best single algorithm of those that a tuning has.
-    fn best_single_ns(&self, tuning: &Tuning) -> f64 {
-        let known = self.ids.iter().zip(&self.ns).filter(|(id, _)| tuning.costs.iter().any(|c| c.algorithm == **id));
-        known.map(|(_, ns)| ns.iter().sum()).fold(f64::INFINITY, f64::min)
+    /// The time of the best single algorithm.
+    fn best_single_ns(&self) -> f64 {
+        self.ns.iter().map(|ns| ns.iter().sum()).fold(f64::INFINITY, f64::min)
     }
 }
 
@@ -212,14 +211,15 @@ fn read_tuning(path: &Path) -> Tuning {
 #[test]
 fn over_traces_the_choice_costs_little_more_than_the_best_single_algorithm() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/traces");
-    // At most 2 % above today's values.
-    for (host, most) in [("amd-epyc-zen3-2c", [1.07, 1.10, 1.08]), ("intel-xeon-16c", [1.09, 1.09, 1.09])] {
+    // At most 2 % above today's values. The recorded `pair-cache` takes up to 1.17 times `bvh` where boxes move far;
+    // today's takes at most 1.04 times.
+    for (host, most) in [("amd-epyc-zen3-2c", [1.09, 1.11, 1.10]), ("intel-xeon-16c", [1.11, 1.11, 1.11])] {
         let host = folder.join(host);
         let traces = Trace::all(&host);
         for (what, most) in ["measured", "predicted", "other"].into_iter().zip(most) {
             let tuning = read_tuning(&host.join(format!("{what}.tuning")));
             let over = |trace: &Arc<Trace>| {
-                let over = play(trace, &tuning) / trace.best_single_ns(&tuning);
+                let over = play(trace, &tuning) / trace.best_single_ns();
                 println!("{what}: {} {over:.3}", trace.name);
                 over
             };
