@@ -37,7 +37,8 @@ const QUICK_ROUNDS: u32 = 1;
 /// A quick probe may take 30 s. The hardware, starting and writing take the rest.
 const QUICK_TOTAL: Duration = Duration::from_secs(21);
 
-const FULL: [Scenario; 7] = [
+/// Those densities with every kind of motion, on which the incremental algorithms depend.
+const FULL: [Scenario; 10] = [
     Scenario::Uniform,
     Scenario::Clustered,
     Scenario::Slab,
@@ -45,6 +46,9 @@ const FULL: [Scenario; 7] = [
     Scenario::Fast,
     Scenario::Gravity,
     Scenario::Fragmentation,
+    Scenario::Brownian,
+    Scenario::FreeFall,
+    Scenario::Resting,
 ];
 /// Hard scenarios show how slow a method gets, not where one overtakes another: one size a decade and a quarter of
 /// the time.
