@@ -22,7 +22,7 @@ use crate::broad_phase::{BroadPhase, check_count};
 use crate::cpu::Threads;
 use crate::cpu::columns::{Columns, ensure, order_key, part};
 use crate::cpu::kernel::node::{Group, LANES};
-use crate::cpu::kernel::{InStrip, sweep_rows};
+use crate::cpu::kernel::sweep_rows;
 use crate::cpu::level::Simd;
 use crate::cpu::tree::{Members, Tree};
 use crate::cpu::workers::{Outputs, Workers};
@@ -291,7 +291,7 @@ impl Task {
         for strip in strips {
             self.sort(bins, strip, axis)?;
             let boxes = self.columns.len();
-            sweep_rows::<InStrip>(simd, &self.columns, 0..boxes, pairs);
+            sweep_rows::<true>(simd, &self.columns, 0..boxes, pairs);
             if let Some(tree) = tree {
                 (0..boxes)
                     .step_by(LANES)

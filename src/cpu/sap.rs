@@ -6,7 +6,7 @@ use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, check_count};
 use crate::cpu::Threads;
 use crate::cpu::columns::{Columns, ensure, order_key, part};
-use crate::cpu::kernel::{All, sweep_rows};
+use crate::cpu::kernel::sweep_rows;
 use crate::cpu::level::Simd;
 use crate::cpu::sort::sort;
 use crate::cpu::workers::{Outputs, Workers};
@@ -63,7 +63,7 @@ impl BroadPhase for Sap {
             }
         });
         outputs.find(workers, pairs, |k, parts, list| {
-            sweep_rows::<All>(*simd, columns, part(boxes.len(), k, parts), list);
+            sweep_rows::<false>(*simd, columns, part(boxes.len(), k, parts), list);
         });
         pairs.finish_on(workers)
     }

@@ -3,7 +3,7 @@
 use crate::aabb::Aabb;
 use crate::cpu::columns::{Columns, ensure, order_key};
 use crate::cpu::kernel::small::{MOST_ROWS, small_world};
-use crate::cpu::kernel::{All, sweep_rows};
+use crate::cpu::kernel::sweep_rows;
 use crate::cpu::level::Simd;
 use crate::cpu::tree::{Members, Tree};
 use crate::cpu::workers::Workers;
@@ -57,7 +57,7 @@ impl WorldSearch {
             }
             keys.sort_unstable();
             keys.iter().enumerate().for_each(|(at, &key)| rows.set(at, &boxes[key as u32 as usize], 0, key as u32));
-            sweep_rows::<All>(*simd, columns, 0..len, pairs);
+            sweep_rows::<false>(*simd, columns, 0..len, pairs);
         }
         Ok(())
     }

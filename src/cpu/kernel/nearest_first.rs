@@ -1,22 +1,16 @@
 //! Walks through a tree from near to far.
 
 use super::node::{LANES, Node};
-use super::prefetch;
-use super::sixteen::Sixteen;
 use super::walk::{MOST_LEVELS, Walk};
+use super::{Level, at_level, prefetch};
 use crate::cpu::level::Simd;
 use crate::pairs::each_bit;
-#[cfg(target_arch = "x86_64")]
-use std::arch::x86_64::{__m256, __m512};
 
 /// What near and far mean. A lane that contains another has no larger measure.
 pub(crate) trait Measure: Copy {
     /// Writes the measure of each lane, at least 0, to `to`. Returns a mask: bit k is set if lane k holds a box with a
     /// measure of at most `most`. The measures of the other lanes are unspecified.
-    ///
-    /// # Safety
-    /// The caller has the instructions of `V` enabled.
-    unsafe fn measure<V: Sixteen>(&self, node: &Node, most: f32, to: &mut [f32; LANES]) -> u32;
+    fn measure<L: Level>(&self, node: &Node, most: f32, to: &mut [f32; LANES], level: L) -> u32;
 }
 
 /// Children that are left to visit.
@@ -57,30 +51,24 @@ impl Walk<'_> {
         most: f32,
         found: impl FnMut(usize, f32) -> f32,
     ) {
-        match simd {
-            // SAFETY: the proof says that this CPU has the instructions.
-            #[cfg(target_arch = "x86_64")]
-            Simd::Avx512(_) => unsafe { nearest_first_avx512(self, measure, most, found) },
-            // SAFETY: as above.
-            #[cfg(target_arch = "x86_64")]
-            Simd::Avx2(_) => unsafe { nearest_first_avx2(self, measure, most, found) },
-            // SAFETY: every CPU has the instructions of the baseline.
-            Simd::Portable => unsafe { self.nearest_first_by::<[f32; LANES]>(measure, most, found) },
-        }
+        let walk = self;
+        at_level!(simd, [] [] Walk::nearest_first_at(
+            walk: &Walk<'_>,
+            measure: impl Measure,
+            most: f32,
+            found: impl FnMut(usize, f32) -> f32,
+        ));
     }
 
-    /// # Safety
-    /// The caller has the instructions of `V` enabled.
     #[inline(always)]
-    unsafe fn nearest_first_by<V: Sixteen>(
+    fn nearest_first_at<L: Level>(
         &self,
         measure: impl Measure,
         mut most: f32,
         mut found: impl FnMut(usize, f32) -> f32,
+        level: L,
     ) {
         let Some(top) = self.levels.iter().rposition(|level| !level.is_empty()) else { return };
-        // SAFETY: the caller has the instructions of `V` enabled.
-        let measure = |node: &Node, most, to: &mut [f32; LANES]| unsafe { measure.measure::<V>(node, most, to) };
         // The nodes of the top have no parent: each 16 of them count as the children of one.
         let mut open = [Open::NONE; MOST_LEVELS + 1];
         for (node, roots) in self.levels[top].chunks(LANES).enumerate() {
@@ -88,7 +76,7 @@ impl Walk<'_> {
             for (k, root) in roots.iter().enumerate() {
                 let mut lanes = [0.0; LANES];
                 let mut nearest = f32::INFINITY;
-                each_bit(measure(root, most, &mut lanes), |lane| {
+                each_bit(measure.measure(root, most, &mut lanes, level), |lane| {
                     open[top + 1].left |= 1 << k;
                     nearest = nearest.min(lanes[lane]);
                 });
@@ -104,7 +92,7 @@ impl Walk<'_> {
                 at -= 1;
                 let below = &mut open[at];
                 below.node = child;
-                below.left = measure(&self.levels[at][child], most, &mut below.measures);
+                below.left = measure.measure(&self.levels[at][child], most, &mut below.measures, level);
                 if at == 0 {
                     each_bit(below.left, |lane| {
                         if below.measures[lane] <= most {
@@ -119,18 +107,4 @@ impl Walk<'_> {
             }
         }
     }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f")]
-fn nearest_first_avx512(walk: &Walk<'_>, measure: impl Measure, most: f32, found: impl FnMut(usize, f32) -> f32) {
-    // SAFETY: the instructions are enabled here.
-    unsafe { walk.nearest_first_by::<[__m512; 1]>(measure, most, found) };
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn nearest_first_avx2(walk: &Walk<'_>, measure: impl Measure, most: f32, found: impl FnMut(usize, f32) -> f32) {
-    // SAFETY: the instructions are enabled here.
-    unsafe { walk.nearest_first_by::<[__m256; 2]>(measure, most, found) };
 }

@@ -1,5 +1,7 @@
 //! Sixteen boxes as columns, tested together against one box.
 
+use super::Level;
+use super::floats::Floats;
 use crate::aabb::Aabb;
 use crate::cpu::tree::NOBODY;
 
@@ -87,14 +89,25 @@ impl Node {
 
     /// Returns a mask: bit k is set if lane k overlaps a box.
     #[inline(always)]
-    pub(super) fn overlapping(&self, b: &Aabb) -> u32 {
-        let mut meet = [true; LANES];
-        for a in 0..3 {
-            for (lane, meet) in meet.iter_mut().enumerate() {
-                *meet &= (self.low[a][lane] <= b.max[a]) & (self.high[a][lane] >= b.min[a]);
-            }
+    pub(super) fn overlapping<L: Level>(&self, b: &Aabb, _: L) -> u32 {
+        // SAFETY: the level proves that this CPU has its instructions.
+        unsafe {
+            let all = L::Lanes::and(self.overlapping_on::<L::Lanes>(0, b), self.overlapping_on::<L::Lanes>(1, b));
+            L::Lanes::bits(L::Lanes::and(all, self.overlapping_on::<L::Lanes>(2, b)))
         }
-        meet.iter().enumerate().fold(0, |mask, (lane, &meet)| mask | u32::from(meet) << lane)
+    }
+
+    /// Returns which lanes overlap a box on an axis.
+    ///
+    /// # Safety
+    /// As for all [`Floats`].
+    #[inline(always)]
+    unsafe fn overlapping_on<F: Floats>(&self, a: usize, b: &Aabb) -> F::Mask {
+        // SAFETY: as above; each column has 16 floats.
+        unsafe {
+            let begins = F::load(self.low[a].as_ptr()).at_most(F::splat(b.max[a]));
+            F::and(begins, F::splat(b.min[a]).at_most(F::load(self.high[a].as_ptr())))
+        }
     }
 }
 

@@ -1,8 +1,9 @@
 //! A moved box against sixteen: the slab test. A ray is a moved box of no extent.
 
+use super::Level;
+use super::floats::Floats;
 use super::nearest_first::Measure;
 use super::node::{LANES, Node};
-use super::sixteen::Sixteen;
 use crate::aabb::Aabb;
 
 /// A box on its way; see [`Tree::cast_box`](crate::cpu::tree::Tree::cast_box).
@@ -23,23 +24,31 @@ impl Cast {
 
 impl Measure for Cast {
     #[inline(always)]
-    unsafe fn measure<V: Sixteen>(&self, node: &Node, most: f32, to: &mut [f32; LANES]) -> u32 {
-        // SAFETY: the caller has the instructions of `V` enabled.
+    fn measure<L: Level>(&self, node: &Node, most: f32, to: &mut [f32; LANES], _: L) -> u32 {
+        // SAFETY: the level proves that this CPU has its instructions; each column has 16 floats.
         unsafe {
-            let (mut enter, mut leave) = (V::splat(0.0), V::splat(most));
+            let (mut enter, mut leave) = (L::Lanes::splat(0.0), L::Lanes::splat(most));
             for a in 0..3 {
                 let (low, high) = ((&node.low[a], self.high[a]), (&node.high[a], self.low[a]));
                 let (near, far) = if self.inverse[a] < 0.0 { (high, low) } else { (low, high) };
-                let inverse = V::splat(self.inverse[a]);
-                let time = |(bounds, of_cast)| V::load(bounds).minus(V::splat(of_cast)).times(inverse);
                 // In this order NaN is no limit.
-                enter = time(near).or_more(enter);
-                leave = time(far).or_less(leave);
+                enter = times::<L::Lanes>(near, self.inverse[a]).or_more(enter);
+                leave = times::<L::Lanes>(far, self.inverse[a]).or_less(leave);
             }
-            enter.store(to);
-            let low = V::load(&node.low[0]);
+            enter.store(to.as_mut_ptr());
+            let low = L::Lanes::load(node.low[0].as_ptr());
             // The second comparison leaves out lanes without a box.
-            enter.at_most(leave) & low.at_most(low)
+            L::Lanes::bits(enter.at_most(leave)) & L::Lanes::bits(low.at_most(low))
         }
     }
+}
+
+/// Returns when a bound of the moved box meets each of these bounds.
+///
+/// # Safety
+/// As for all [`Floats`].
+#[inline(always)]
+unsafe fn times<F: Floats>((bounds, of_cast): (&[f32; LANES], f32), inverse: f32) -> F {
+    // SAFETY: as above; there are 16 floats.
+    unsafe { F::load(bounds.as_ptr()).minus(F::splat(of_cast)).times(F::splat(inverse)) }
 }

@@ -1,6 +1,7 @@
 //! All pairs of a few dozen boxes.
 
-use super::{Lanes, Query, View};
+use super::floats::Floats;
+use super::{Level, Query, View, at_level};
 use crate::cpu::columns::Columns;
 use crate::cpu::level::Simd;
 use crate::pairs::Pairs;
@@ -18,31 +19,21 @@ const UNASKED: usize = 2;
 /// Tests every row against all rows behind it, on all three axes, and adds the pairs. Row k is box `first + k`; there
 /// are at most [`MOST_ROWS`].
 pub(crate) fn small_world(simd: Simd, columns: &Columns, first: u32, pairs: &mut Pairs) {
-    let view = View::new(columns);
-    match simd {
-        // SAFETY: the proof says that this CPU has the instructions.
-        #[cfg(target_arch = "x86_64")]
-        Simd::Avx512(proof) => unsafe { super::x86::small_avx512(proof, &view, first, pairs) },
-        // SAFETY: as above.
-        #[cfg(target_arch = "x86_64")]
-        Simd::Avx2(proof) => unsafe { super::x86::small_avx2(proof, &view, first, pairs) },
-        Simd::Portable => small(super::Baseline, &view, first, pairs),
-    }
+    let view = &View::new(columns);
+    at_level!(simd, [] [] small(view: &View<'_>, first: u32, pairs: &mut Pairs));
 }
 
 #[inline(always)]
-pub(super) fn small<L: Lanes>(lanes: L, view: &View<'_>, first: u32, pairs: &mut Pairs) {
+fn small<L: Level>(view: &View<'_>, first: u32, pairs: &mut Pairs, level: L) {
     let mut hits = [0; MOST_ROWS];
     let hits = &mut hits[..view.len];
-    for at in (0..view.len).step_by(L::COUNT) {
+    for at in (0..view.len).step_by(L::Rows::COUNT) {
         // Those before these rows, and these.
-        let rows = view.len.min(at + L::COUNT);
+        let rows = view.len.min(at + L::Rows::COUNT);
         let (low, high) = (view.low.map(|c| &c[..rows]), view.high.map(|c| &c[..rows]));
         for (row, hits) in hits[..rows].iter_mut().enumerate() {
             let query = Query { low: low.map(|c| c[row]), high: high.map(|c| c[row]), id: 0, begins: 0 };
-            // SAFETY: `at < view.len`; the caller enabled the instructions of `L`.
-            let mask = unsafe { lanes.reach_and_hits(view, at, &query).1 & lanes.ends_after(view, at, query.low[0]) };
-            *hits |= u64::from(mask) << at;
+            *hits |= u64::from(view.hits(at, &query, level)) << at;
         }
     }
     hits.iter_mut().enumerate().for_each(|(row, hits)| *hits &= !1 << row);

@@ -2,11 +2,10 @@
 
 use super::marks::{Marks, Wanted};
 use super::node::{Group, LANES, Node};
-use super::{prefetch, write_each};
+use super::{Baseline, Level, at_level, prefetch};
 use crate::aabb::Aabb;
 use crate::cpu::level::Simd;
 use crate::filter::Membership;
-use crate::pair::Pair;
 use crate::pairs::{Pairs, each_bit};
 use std::ops::Range;
 
@@ -57,9 +56,6 @@ pub(crate) const SAMPLE: usize = 32;
 /// Levels of a tree of 2^32 boxes.
 pub(super) const MOST_LEVELS: usize = 9;
 
-/// All lanes of a level.
-const EVERY: Range<usize> = 0..usize::MAX;
-
 impl Walk<'_> {
     /// Calls `found` for every place in the leaves whose box overlaps `b` and, if the tree has marks, is wanted `by`
     /// the box. Returns the number of nodes compared with it.
@@ -86,15 +82,15 @@ impl Walk<'_> {
         by: &W::Query,
         found: impl FnMut(usize),
     ) -> u32 {
-        match simd {
-            // SAFETY: the proof says that this CPU has the instructions.
-            #[cfg(target_arch = "x86_64")]
-            Simd::Avx512(_) => unsafe { x86::each_avx512(self, b, marks, by, found) },
-            // SAFETY: as above.
-            #[cfg(target_arch = "x86_64")]
-            Simd::Avx2(_) => unsafe { x86::each_avx2(self, b, marks, by, found) },
-            Simd::Portable => self.each((b, by), EVERY, 0, Node::overlapping, marks, found),
-        }
+        let (walk, query, every, leaves) = (self, (b, by), 0..usize::MAX, 0);
+        at_level!(simd, [W: Wanted] [W] Walk::each(
+            walk: &Walk<'_>,
+            query: (&Aabb, &W::Query),
+            every: Range<usize>,
+            leaves: usize,
+            marks: impl MarksOf<W>,
+            found: impl FnMut(usize),
+        ) -> u32)
     }
 
     /// Adds the pairs of the boxes in these leaves with each other and with those in all leaves behind.
@@ -115,21 +111,13 @@ impl Walk<'_> {
         marks: impl MarksOf<W>,
         pairs: &mut Pairs,
     ) {
-        match simd {
-            // SAFETY: the proof says that this CPU has the instructions.
-            #[cfg(target_arch = "x86_64")]
-            Simd::Avx512(_) => unsafe { x86::self_avx512(self, leaves, marks, pairs) },
-            // SAFETY: as above.
-            #[cfg(target_arch = "x86_64")]
-            Simd::Avx2(_) => unsafe { x86::self_avx2(self, leaves, marks, pairs) },
-            Simd::Portable => self.leaves_with_all_behind(
-                leaves,
-                Node::overlapping,
-                |i, j, hits, to| write_each(i, j, hits, to),
-                marks,
-                pairs,
-            ),
-        }
+        let walk = self;
+        at_level!(simd, [W: Wanted] [W] Walk::leaves_with_all_behind(
+            walk: &Walk<'_>,
+            leaves: Range<usize>,
+            marks: impl MarksOf<W>,
+            pairs: &mut Pairs,
+        ));
     }
 
     /// Adds the pairs of the boxes of a group with those in the leaves.
@@ -151,34 +139,23 @@ impl Walk<'_> {
         pairs: &mut Pairs,
     ) {
         let by = of_group.query_all();
-        let side = Side { node: &group.node, bounds: &group.bounds, ids: &group.ids, marks: of_group, by: &by };
-        match simd {
-            // SAFETY: the proof says that this CPU has the instructions.
-            #[cfg(target_arch = "x86_64")]
-            Simd::Avx512(_) => unsafe { x86::group_avx512(self, &side, marks, pairs) },
-            // SAFETY: as above.
-            #[cfg(target_arch = "x86_64")]
-            Simd::Avx2(_) => unsafe { x86::group_avx2(self, &side, marks, pairs) },
-            Simd::Portable => {
-                self.group_with_all(
-                    &side,
-                    Node::overlapping,
-                    |i, j, hits, to| write_each(i, j, hits, to),
-                    marks,
-                    pairs,
-                );
-            }
-        }
+        let walk = self;
+        let group = &Side { node: &group.node, bounds: &group.bounds, ids: &group.ids, marks: of_group, by: &by };
+        at_level!(simd, [W: Wanted] [W] Walk::group_with_all(
+            walk: &Walk<'_>,
+            group: &Side<'_, W>,
+            marks: impl MarksOf<W>,
+            pairs: &mut Pairs,
+        ));
     }
 
     #[inline(always)]
-    fn leaves_with_all_behind<W: Wanted>(
+    fn leaves_with_all_behind<W: Wanted, L: Level>(
         &self,
         leaves: Range<usize>,
-        overlapping: impl Fn(&Node, &Aabb) -> u32 + Copy,
-        write: impl Write,
         marks: impl MarksOf<W>,
         pairs: &mut Pairs,
+        simd: L,
     ) {
         for leaf in leaves {
             let node = &self.levels[0][leaf];
@@ -187,10 +164,10 @@ impl Walk<'_> {
             let wants_own = !W::TESTS || mine.among(u32::MAX, &by) != 0;
             for (lane, &id) in ids.iter().enumerate().filter(|_| wants_own) {
                 // Only lanes behind this one: each pair is found from its first lane.
-                let hits = overlapping(node, &node.lane(lane)) & (u32::MAX - 1) << lane;
+                let hits = node.overlapping(&node.lane(lane), simd) & (u32::MAX - 1) << lane;
                 let hits = mine.among(hits, &mine.query(lane));
                 if hits != 0 {
-                    add::<W>(id, ids, hits, write, pairs);
+                    add::<W, _>(id, ids, hits, pairs, simd);
                 }
             }
             let bounds = self.bounds_of(leaf);
@@ -198,9 +175,8 @@ impl Walk<'_> {
             let mut from = leaf + 1;
             let apart = self.apart.iter().filter(|apart| apart.leaves.contains(&leaf)).map(|apart| &apart.others);
             for Range { start, end } in apart.chain([&(usize::MAX..usize::MAX)]) {
-                self.each((&bounds, &by), from..*start, 1, overlapping, marks, |other| {
-                    self.meet(&side, other, overlapping, write, marks, pairs);
-                });
+                let meet = |other| self.meet(&side, other, marks, pairs, simd);
+                self.each((&bounds, &by), from..*start, 1, marks, meet, simd);
                 from = *end;
             }
             // A caller who wants a thousand pairs must not wait for all.
@@ -211,51 +187,51 @@ impl Walk<'_> {
     }
 
     #[inline(always)]
-    fn group_with_all<W: Wanted>(
+    fn group_with_all<W: Wanted, L: Level>(
         &self,
         group: &Side<'_, W>,
-        overlapping: impl Fn(&Node, &Aabb) -> u32 + Copy,
-        write: impl Write,
         marks: impl MarksOf<W>,
         pairs: &mut Pairs,
+        simd: L,
     ) {
-        self.each((group.bounds, group.by), EVERY, 1, overlapping, marks, |other| {
-            self.meet(group, other, overlapping, write, marks, pairs);
-        });
+        let meet = |other| self.meet(group, other, marks, pairs, simd);
+        self.each((group.bounds, group.by), 0..usize::MAX, 1, marks, meet, simd);
     }
 
     /// Adds the pairs of the boxes of a node with those of a leaf.
     #[inline(always)]
-    fn meet<W: Wanted>(
+    fn meet<W: Wanted, L: Level>(
         &self,
         side: &Side<'_, W>,
         leaf: usize,
-        overlapping: impl Fn(&Node, &Aabb) -> u32,
-        write: impl Write,
         marks: impl MarksOf<W>,
         pairs: &mut Pairs,
+        simd: L,
     ) {
         let (boxes, ids) = (side.node, side.ids);
         let (node, others) = (&self.levels[0][leaf], self.ids_of(leaf));
         let their_marks = marks(0, leaf);
-        let mine = overlapping(boxes, &self.bounds_of(leaf));
+        let mine = boxes.overlapping(&self.bounds_of(leaf), simd);
         let mine = side.marks.among(mine, &marks(1, leaf / LANES).query(leaf % LANES));
         if mine == 0 {
             return;
         }
-        let theirs = their_marks.among(overlapping(node, side.bounds), side.by);
+        let theirs = their_marks.among(node.overlapping(side.bounds, simd), side.by);
         // Usually few boxes reach into the other leaf: take them from the side that has fewer.
-        let (few, few_ids, few_marks, many, many_ids, many_marks, all) = if mine.count_ones() <= theirs.count_ones() {
-            (boxes, ids, side.marks, node, others, their_marks, mine)
-        } else {
-            (node, others, their_marks, boxes, ids, side.marks, theirs)
-        };
-        each_bit(all, |lane| {
-            let hits = many_marks.among(overlapping(many, &few.lane(lane)), &few_marks.query(lane));
+        let (few, few_ids, few_marks, many, many_ids, many_marks, mut left) =
+            if mine.count_ones() <= theirs.count_ones() {
+                (boxes, ids, side.marks, node, others, their_marks, mine)
+            } else {
+                (node, others, their_marks, boxes, ids, side.marks, theirs)
+            };
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let hits = many_marks.among(many.overlapping(&few.lane(lane), simd), &few_marks.query(lane));
             if hits != 0 {
-                add::<W>(few_ids[lane], many_ids, hits, write, pairs);
+                add::<W, _>(few_ids[lane], many_ids, hits, pairs, simd);
             }
-        });
+        }
     }
 
     /// Estimates the cost of the pairs of a box in `some` leaves with one in `others`: one for each two leaves that
@@ -264,10 +240,11 @@ impl Walk<'_> {
         let step = some.len().div_ceil(SAMPLE).max(1);
         let mut tests = 0;
         for leaf in some.skip(step / 2).step_by(step) {
-            self.each((&self.bounds_of(leaf), &()), others.clone(), 1, Node::overlapping, unmarked, |other| {
-                let reach = Node::overlapping(&self.levels[0][leaf], &self.bounds_of(other));
+            let meet = |other| {
+                let reach = self.levels[0][leaf].overlapping(&self.bounds_of(other), Baseline);
                 tests += 1 + u64::from(reach.count_ones());
-            });
+            };
+            self.each((&self.bounds_of(leaf), &()), others.clone(), 1, unmarked, meet, Baseline);
         }
         tests * step as u64
     }
@@ -289,14 +266,14 @@ impl Walk<'_> {
     /// Calls `found` for every lane of level `bottom`, of those with these numbers, that overlaps a box and may be
     /// wanted by it. Lane k of node n has the number 16 n + k. Returns the number of nodes compared with the box.
     #[inline(always)]
-    fn each<W: Wanted>(
+    fn each<W: Wanted, L: Level>(
         &self,
         (b, by): (&Aabb, &W::Query),
         Range { start, end }: Range<usize>,
         bottom: usize,
-        overlapping: impl Fn(&Node, &Aabb) -> u32,
         marks: impl MarksOf<W>,
         mut found: impl FnMut(usize),
+        simd: L,
     ) -> u32 {
         let Some(top) = self.levels.iter().rposition(|level| !level.is_empty()) else { return 0 };
         // The lanes of a node that contain something of the range.
@@ -313,7 +290,7 @@ impl Walk<'_> {
             // For each level: the node whose children are visited, and a mask of those left.
             let mut open = [(0, 0); MOST_LEVELS];
             let mut at = top;
-            open[at] = (root, marks(at, root).among(overlapping(&self.levels[at][root], b) & lanes(at, root), by));
+            open[at] = (root, marks(at, root).among(self.levels[at][root].overlapping(b, simd) & lanes(at, root), by));
             looked += 1;
             loop {
                 let (node, left) = &mut open[at];
@@ -334,7 +311,7 @@ impl Walk<'_> {
                     below.get(next).into_iter().for_each(prefetch);
                 }
                 at -= 1;
-                open[at] = (child, marks(at, child).among(overlapping(&below[child], b) & lanes(at, child), by));
+                open[at] = (child, marks(at, child).among(below[child].overlapping(b, simd) & lanes(at, child), by));
                 looked += 1;
             }
         }
@@ -342,16 +319,11 @@ impl Walk<'_> {
     }
 }
 
-/// Writes the pairs of a box with each of the others whose bit is set to the head of the room, which is for
-/// [`LANES`] pairs. The rest of the room is unspecified afterwards.
-trait Write: Fn(u32, &[u32; LANES], u32, &mut [Pair; LANES]) + Copy {}
-impl<F: Fn(u32, &[u32; LANES], u32, &mut [Pair; LANES]) + Copy> Write for F {}
-
 /// Adds the pairs of a box with each of `others` whose bit is set.
 #[inline(always)]
-fn add<W: Wanted>(id: u32, others: &[u32; LANES], hits: u32, write: impl Write, pairs: &mut Pairs) {
+fn add<W: Wanted, L: Level>(id: u32, others: &[u32; LANES], hits: u32, pairs: &mut Pairs, simd: L) {
     if let Some(room) = pairs.room(LANES).and_then(|room| room.first_chunk_mut()) {
-        write(id, others, hits, room);
+        simd.write(id, others, hits, room);
         let count = hits.count_ones() as usize;
         if W::TESTS { pairs.extend_by_tested(count) } else { pairs.extend_by(count) }
     } else {
@@ -359,141 +331,11 @@ fn add<W: Wanted>(id: u32, others: &[u32; LANES], hits: u32, write: impl Write, 
     }
 }
 
-#[cfg(target_arch = "x86_64")]
-mod x86 {
-    use super::{EVERY, MarksOf, Side, Walk, Wanted};
-    use crate::aabb::Aabb;
-    use crate::cpu::kernel::node::Node;
-    use crate::cpu::kernel::x86::{write_avx2, write_avx512};
-    use crate::pairs::Pairs;
-    use std::arch::x86_64::*;
-    use std::ops::Range;
-
-    #[target_feature(enable = "avx512f")]
-    #[inline]
-    fn overlapping_avx512(node: &Node, b: &Aabb) -> u32 {
-        let mut mask = u16::MAX;
-        for a in 0..3 {
-            // SAFETY: each column has 16 floats.
-            let (low, high) =
-                unsafe { (_mm512_loadu_ps(node.low[a].as_ptr()), _mm512_loadu_ps(node.high[a].as_ptr())) };
-            mask &= _mm512_cmp_ps_mask::<_CMP_LE_OQ>(low, _mm512_set1_ps(b.max[a]));
-            mask &= _mm512_cmp_ps_mask::<_CMP_GE_OQ>(high, _mm512_set1_ps(b.min[a]));
-        }
-        u32::from(mask)
-    }
-
-    #[target_feature(enable = "avx2")]
-    #[inline]
-    fn overlapping_avx2(node: &Node, b: &Aabb) -> u32 {
-        let mut halves = [_mm256_castsi256_ps(_mm256_set1_epi32(-1)); 2];
-        for a in 0..3 {
-            let (from, to) = (_mm256_set1_ps(b.max[a]), _mm256_set1_ps(b.min[a]));
-            for (k, all) in halves.iter_mut().enumerate() {
-                // SAFETY: each column has 16 floats.
-                let (low, high) = unsafe {
-                    (
-                        _mm256_loadu_ps(node.low[a].as_ptr().add(8 * k)),
-                        _mm256_loadu_ps(node.high[a].as_ptr().add(8 * k)),
-                    )
-                };
-                let below = _mm256_cmp_ps::<_CMP_LE_OQ>(low, from);
-                *all = _mm256_and_ps(*all, _mm256_and_ps(below, _mm256_cmp_ps::<_CMP_GE_OQ>(high, to)));
-            }
-        }
-        _mm256_movemask_ps(halves[0]) as u32 | (_mm256_movemask_ps(halves[1]) as u32) << 8
-    }
-
-    #[target_feature(enable = "avx512f")]
-    pub(super) fn each_avx512<W: Wanted>(
-        walk: &Walk<'_>,
-        b: &Aabb,
-        marks: impl MarksOf<W>,
-        by: &W::Query,
-        found: impl FnMut(usize),
-    ) -> u32 {
-        walk.each((b, by), EVERY, 0, |node, b| overlapping_avx512(node, b), marks, found)
-    }
-
-    #[target_feature(enable = "avx2")]
-    pub(super) fn each_avx2<W: Wanted>(
-        walk: &Walk<'_>,
-        b: &Aabb,
-        marks: impl MarksOf<W>,
-        by: &W::Query,
-        found: impl FnMut(usize),
-    ) -> u32 {
-        walk.each((b, by), EVERY, 0, |node, b| overlapping_avx2(node, b), marks, found)
-    }
-
-    #[target_feature(enable = "avx512f")]
-    pub(super) fn self_avx512<W: Wanted>(
-        walk: &Walk<'_>,
-        leaves: Range<usize>,
-        marks: impl MarksOf<W>,
-        pairs: &mut Pairs,
-    ) {
-        walk.leaves_with_all_behind(
-            leaves,
-            |node, b| overlapping_avx512(node, b),
-            |i, j, hits, to| write_avx512(i, j, hits, to),
-            marks,
-            pairs,
-        );
-    }
-
-    #[target_feature(enable = "avx2")]
-    pub(super) fn self_avx2<W: Wanted>(
-        walk: &Walk<'_>,
-        leaves: Range<usize>,
-        marks: impl MarksOf<W>,
-        pairs: &mut Pairs,
-    ) {
-        walk.leaves_with_all_behind(
-            leaves,
-            |node, b| overlapping_avx2(node, b),
-            |i, j, hits, to| write_avx2(i, j, hits, to),
-            marks,
-            pairs,
-        );
-    }
-
-    #[target_feature(enable = "avx512f")]
-    pub(super) fn group_avx512<W: Wanted>(
-        walk: &Walk<'_>,
-        group: &Side<'_, W>,
-        marks: impl MarksOf<W>,
-        pairs: &mut Pairs,
-    ) {
-        walk.group_with_all(
-            group,
-            |node, b| overlapping_avx512(node, b),
-            |i, j, hits, to| write_avx512(i, j, hits, to),
-            marks,
-            pairs,
-        );
-    }
-
-    #[target_feature(enable = "avx2")]
-    pub(super) fn group_avx2<W: Wanted>(
-        walk: &Walk<'_>,
-        group: &Side<'_, W>,
-        marks: impl MarksOf<W>,
-        pairs: &mut Pairs,
-    ) {
-        walk.group_with_all(
-            group,
-            |node, b| overlapping_avx2(node, b),
-            |i, j, hits, to| write_avx2(i, j, hits, to),
-            marks,
-            pairs,
-        );
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::write_each;
     use super::*;
+    use crate::pair::Pair;
 
     /// Returns 300 boxes in 19 leaves. The last leaf has empty lanes.
     fn scene() -> (Vec<Aabb>, Vec<Vec<Node>>, Vec<u32>) {
@@ -525,22 +367,19 @@ mod tests {
     }
 
     #[test]
-    #[cfg(target_arch = "x86_64")]
     fn every_level_writes_the_pairs_of_any_hits() {
-        use crate::cpu::kernel::x86::{write_avx2, write_avx512};
+        fn written<L: Level>(others: &[u32; LANES], hits: u32, level: L) -> [Pair; LANES] {
+            let mut written = [(0, 0); LANES];
+            level.write(77, others, hits, &mut written);
+            written
+        }
         let others: [u32; LANES] = std::array::from_fn(|k| 10 * k as u32 + u32::from(k % 3 == 0) * 4_000_000_000);
         for hits in 0..1_u32 << LANES {
             let mut expected = [(0, 0); LANES];
             write_each(77, &others, hits, &mut expected);
             for simd in Simd::every() {
-                let mut written = [(0, 0); LANES];
-                match simd {
-                    // SAFETY: the proof says that this CPU has the instructions.
-                    Simd::Avx512(_) => unsafe { write_avx512(77, &others, hits, &mut written) },
-                    // SAFETY: as above.
-                    Simd::Avx2(_) => unsafe { write_avx2(77, &others, hits, &mut written) },
-                    Simd::Portable => continue,
-                }
+                let others = &others;
+                let written = at_level!(simd, [] [] written(others: &[u32; LANES], hits: u32) -> [Pair; LANES]);
                 let count = hits.count_ones() as usize;
                 assert_eq!(written[..count], expected[..count], "{simd:?} {hits:b}");
             }

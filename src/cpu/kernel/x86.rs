@@ -1,112 +1,54 @@
-//! SSE2, which every x86-64 CPU has, AVX2 and AVX-512.
+//! What AVX2 and AVX-512 do in another way than other levels.
 
-use super::small::small;
-use super::{Lanes, Query, Rows, View, brute, sweep};
+use super::contain::BLOCK;
+use super::node::LANES;
+use super::{Level, View};
+use crate::aabb::Aabb;
 use crate::cpu::level::{Avx2, Avx512};
 use crate::pair::Pair;
-use crate::pairs::Pairs;
 use std::arch::x86_64::*;
 use std::mem::offset_of;
-use std::ops::Range;
 
-/// Eight rows in two vectors.
-#[derive(Clone, Copy)]
-pub(super) struct Sse2;
-
-impl Lanes for Sse2 {
-    const COUNT: usize = 8;
+impl Level for Avx2 {
+    type Rows = [__m256; 1];
+    type Lanes = [__m256; 2];
 
     #[inline(always)]
-    unsafe fn reach_and_hits(self, view: &View<'_>, at: usize, query: &Query) -> (u32, u32) {
-        let half = |at: usize| {
-            // SAFETY: every column has 16 values behind `view.len >= at`.
-            unsafe {
-                let below =
-                    |column: &[f32], bound| _mm_cmple_ps(_mm_loadu_ps(column.as_ptr().add(at)), _mm_set1_ps(bound));
-                let above =
-                    |column: &[f32], bound| _mm_cmpge_ps(_mm_loadu_ps(column.as_ptr().add(at)), _mm_set1_ps(bound));
-                let reach = below(view.low[0], query.high[0]);
-                let second = _mm_and_ps(below(view.low[1], query.high[1]), above(view.high[1], query.low[1]));
-                let third = _mm_and_ps(below(view.low[2], query.high[2]), above(view.high[2], query.low[2]));
-                let hits = _mm_and_ps(reach, _mm_and_ps(second, third));
-                (_mm_movemask_ps(reach) as u32, _mm_movemask_ps(hits) as u32)
-            }
-        };
-        let ((reach, hits), (more_reach, more_hits)) = (half(at), half(at + 4));
-        (reach | more_reach << 4, hits | more_hits << 4)
+    fn write(self, id: u32, others: &[u32; LANES], hits: u32, room: &mut [Pair; LANES]) {
+        // SAFETY: `self` is the proof of AVX2.
+        unsafe { write_avx2(id, others, hits, room) };
     }
 
     #[inline(always)]
-    unsafe fn ends_after(self, view: &View<'_>, at: usize, low: f32) -> u32 {
-        let half = |at: usize| {
-            // SAFETY: as above.
-            unsafe {
-                let high = _mm_loadu_ps(view.high[0].as_ptr().add(at));
-                _mm_movemask_ps(_mm_cmpge_ps(high, _mm_set1_ps(low))) as u32
-            }
-        };
-        half(at) | half(at + 4) << 4
-    }
-}
-
-impl Lanes for Avx2 {
-    const COUNT: usize = 8;
-
-    #[inline(always)]
-    unsafe fn reach_and_hits(self, view: &View<'_>, at: usize, query: &Query) -> (u32, u32) {
-        // SAFETY: every column has 16 values behind `view.len >= at`; `self` is the proof of AVX2.
+    fn all_within(self, boxes: &[Aabb; BLOCK], outer: &[Aabb; BLOCK]) -> bool {
+        let (b, o) = (boxes.as_ptr().cast::<f32>(), outer.as_ptr().cast::<f32>());
+        // SAFETY: `self` is the proof of AVX2. A block has 48 floats; `Aabb` is `repr(C)`. The upper bound follows its
+        // lower one three floats later, and a masked load reads no lane whose mask is clear.
         unsafe {
-            let load = |column: &[f32]| _mm256_loadu_ps(column.as_ptr().add(at));
-            let below = |column, bound| _mm256_cmp_ps::<_CMP_LE_OQ>(load(column), _mm256_set1_ps(bound));
-            let above = |column, bound| _mm256_cmp_ps::<_CMP_GE_OQ>(load(column), _mm256_set1_ps(bound));
-            let reach = below(view.low[0], query.high[0]);
-            let second = _mm256_and_ps(below(view.low[1], query.high[1]), above(view.high[1], query.low[1]));
-            let third = _mm256_and_ps(below(view.low[2], query.high[2]), above(view.high[2], query.low[2]));
-            let hits = _mm256_and_ps(reach, _mm256_and_ps(second, third));
-            (_mm256_movemask_ps(reach) as u32, _mm256_movemask_ps(hits) as u32)
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn ends_after(self, view: &View<'_>, at: usize, low: f32) -> u32 {
-        // SAFETY: as above.
-        unsafe {
-            let high = _mm256_loadu_ps(view.high[0].as_ptr().add(at));
-            _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GE_OQ>(high, _mm256_set1_ps(low))) as u32
+            let mut good = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
+            for k in [0_usize, 8, 16, 24, 32, 40] {
+                let bit = |lane: usize| if LOWER >> (k + lane) & 1 == 1 { -1 } else { 0 };
+                let lower = _mm256_setr_epi32(bit(0), bit(1), bit(2), bit(3), bit(4), bit(5), bit(6), bit(7));
+                let (inner, bound) = (_mm256_loadu_ps(b.add(k)), _mm256_loadu_ps(o.add(k)));
+                let upper = _mm256_maskload_ps(b.add(k).wrapping_add(3), lower);
+                let lower = _mm256_castsi256_ps(lower);
+                let from =
+                    _mm256_and_ps(_mm256_cmp_ps::<_CMP_GE_OQ>(inner, bound), _mm256_cmp_ps::<_CMP_LE_OQ>(inner, upper));
+                let to = _mm256_cmp_ps::<_CMP_LE_OQ>(inner, bound);
+                good = _mm256_and_ps(good, _mm256_blendv_ps(to, from, lower));
+            }
+            _mm256_movemask_ps(good) == 0xff
         }
     }
 }
 
-impl Lanes for Avx512 {
-    const COUNT: usize = 16;
-
-    #[inline(always)]
-    unsafe fn reach_and_hits(self, view: &View<'_>, at: usize, query: &Query) -> (u32, u32) {
-        // SAFETY: every column has 16 values behind `view.len >= at`; `self` is the proof of AVX-512F.
-        unsafe {
-            let load = |column: &[f32]| _mm512_loadu_ps(column.as_ptr().add(at));
-            // Each comparison by itself: one masked by the result of another would wait for it.
-            let below = |column, bound| _mm512_cmp_ps_mask::<_CMP_LE_OQ>(load(column), _mm512_set1_ps(bound));
-            let above = |column, bound| _mm512_cmp_ps_mask::<_CMP_GE_OQ>(load(column), _mm512_set1_ps(bound));
-            let reach = below(view.low[0], query.high[0]);
-            let second = below(view.low[1], query.high[1]) & above(view.high[1], query.low[1]);
-            let third = below(view.low[2], query.high[2]) & above(view.high[2], query.low[2]);
-            (u32::from(reach), u32::from(reach & second & third))
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn ends_after(self, view: &View<'_>, at: usize, low: f32) -> u32 {
-        // SAFETY: as above.
-        unsafe {
-            let high = _mm512_loadu_ps(view.high[0].as_ptr().add(at));
-            u32::from(_mm512_cmp_ps_mask::<_CMP_GE_OQ>(high, _mm512_set1_ps(low)))
-        }
-    }
+impl Level for Avx512 {
+    type Rows = [__m512; 1];
+    type Lanes = [__m512; 1];
 
     #[inline(always)]
     unsafe fn owned(self, view: &View<'_>, at: usize, begins: u32, hits: u32) -> u32 {
-        // SAFETY: as above.
+        // SAFETY: every column has 16 values behind `view.len >= at`; `self` is the proof of AVX-512F.
         unsafe {
             let all = _mm512_loadu_si512(view.begins.as_ptr().add(at).cast());
             let both = _mm512_or_si512(all, _mm512_set1_epi32(begins as i32));
@@ -115,14 +57,46 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
-    unsafe fn write(self, view: &View<'_>, at: usize, id: u32, hits: u32, room: &mut [Pair]) {
-        // SAFETY: as above for the column, of which 16 values are read.
-        unsafe {
-            let others = &*view.ids.as_ptr().add(at).cast();
-            write_avx512(id, others, hits, room.first_chunk_mut().unwrap());
+    unsafe fn write_rows(self, view: &View<'_>, at: usize, id: u32, hits: u32, room: &mut [Pair]) {
+        // SAFETY: as above.
+        let others = unsafe { &*view.ids.as_ptr().add(at).cast() };
+        self.write(id, others, hits, room.first_chunk_mut().unwrap());
+    }
+
+    #[inline(always)]
+    fn write(self, id: u32, others: &[u32; LANES], hits: u32, room: &mut [Pair; LANES]) {
+        // SAFETY: `self` is the proof of AVX-512F.
+        unsafe { write_avx512(id, others, hits, room) };
+    }
+
+    #[inline(always)]
+    fn all_within(self, boxes: &[Aabb; BLOCK], outer: &[Aabb; BLOCK]) -> bool {
+        let (b, o) = (boxes.as_ptr().cast::<f32>(), outer.as_ptr().cast::<f32>());
+        let mut bad = 0;
+        for k in [0_usize, 16, 32] {
+            let lower = (LOWER >> k) as __mmask16;
+            // SAFETY: as for AVX2; the mask leaves out the lanes beyond the block.
+            unsafe {
+                let (inner, bound) = (_mm512_loadu_ps(b.add(k)), _mm512_loadu_ps(o.add(k)));
+                let upper = _mm512_maskz_loadu_ps(lower, b.add(k).wrapping_add(3));
+                bad |= _mm512_mask_cmp_ps_mask::<_CMP_NGE_UQ>(lower, inner, bound);
+                bad |= _mm512_mask_cmp_ps_mask::<_CMP_NLE_UQ>(!lower, inner, bound);
+                bad |= _mm512_mask_cmp_ps_mask::<_CMP_NLE_UQ>(lower, inner, upper);
+            }
         }
+        bad == 0
     }
 }
+
+/// Bit k is set if bound k of the 48 bounds of eight boxes is a lower one.
+const LOWER: u64 = {
+    let (mut bits, mut k) = (0, 0);
+    while k < 6 * BLOCK {
+        bits |= ((k % 6 < 3) as u64) << k;
+        k += 1;
+    }
+    bits
+};
 
 // Rust promises no layout of a tuple: this stops the build if it is another one.
 const _: () = assert!(size_of::<Pair>() == 8 && offset_of!(Pair, 0) == 0 && offset_of!(Pair, 1) == 4);
@@ -131,7 +105,7 @@ const _: () = assert!(size_of::<Pair>() == 8 && offset_of!(Pair, 0) == 0 && offs
 /// unspecified afterwards.
 #[target_feature(enable = "avx512f")]
 #[inline]
-pub(super) fn write_avx512(id: u32, others: &[u32; 16], hits: u32, room: &mut [Pair; 16]) {
+fn write_avx512(id: u32, others: &[u32; 16], hits: u32, room: &mut [Pair; 16]) {
     let to = room.as_mut_ptr().cast::<i32>();
     // SAFETY: there are 16 others, and `room` holds 32 integers.
     unsafe {
@@ -164,10 +138,10 @@ static LANES_OF: [u64; 256] = {
     table
 };
 
-/// As [`write_avx512`].
+/// Does the same as [`write_avx512`].
 #[target_feature(enable = "avx2")]
 #[inline]
-pub(super) fn write_avx2(id: u32, others: &[u32; 16], hits: u32, room: &mut [Pair; 16]) {
+fn write_avx2(id: u32, others: &[u32; 16], hits: u32, room: &mut [Pair; 16]) {
     let one = _mm256_set1_epi32(id as i32);
     let mut half = |k: usize, at: usize| {
         // SAFETY: there are eight others from `8 k` on. At most `8 k` pairs stand before `at`, and eight are written,
@@ -186,46 +160,4 @@ pub(super) fn write_avx2(id: u32, others: &[u32; 16], hits: u32, room: &mut [Pai
     };
     half(0, 0);
     half(1, (hits & 255).count_ones() as usize);
-}
-
-#[target_feature(enable = "avx2")]
-pub(super) fn sweep_avx2<R: Rows>(proof: Avx2, view: &View<'_>, rows: Range<usize>, pairs: &mut Pairs) {
-    sweep::<_, R>(proof, view, rows, pairs);
-}
-
-#[target_feature(enable = "avx2")]
-pub(super) fn brute_avx2(
-    proof: Avx2,
-    view: &View<'_>,
-    rows: Range<usize>,
-    first: impl Fn(usize) -> usize,
-    pairs: &mut Pairs,
-) {
-    brute(proof, view, rows, first, pairs);
-}
-
-#[target_feature(enable = "avx512f")]
-pub(super) fn sweep_avx512<R: Rows>(proof: Avx512, view: &View<'_>, rows: Range<usize>, pairs: &mut Pairs) {
-    sweep::<_, R>(proof, view, rows, pairs);
-}
-
-#[target_feature(enable = "avx512f")]
-pub(super) fn brute_avx512(
-    proof: Avx512,
-    view: &View<'_>,
-    rows: Range<usize>,
-    first: impl Fn(usize) -> usize,
-    pairs: &mut Pairs,
-) {
-    brute(proof, view, rows, first, pairs);
-}
-
-#[target_feature(enable = "avx2")]
-pub(super) fn small_avx2(proof: Avx2, view: &View<'_>, first: u32, pairs: &mut Pairs) {
-    small(proof, view, first, pairs);
-}
-
-#[target_feature(enable = "avx512f")]
-pub(super) fn small_avx512(proof: Avx512, view: &View<'_>, first: u32, pairs: &mut Pairs) {
-    small(proof, view, first, pairs);
 }

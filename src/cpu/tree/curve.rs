@@ -152,7 +152,7 @@ impl Curve {
     #[inline(always)]
     fn place(&self, b: &Aabb, cells: &Cells) -> ([u32; 3], [f32; 3], bool) {
         use std::arch::x86_64::*;
-        let [low, high] = corners(b);
+        let [[low], [high]] = corners(b);
         // SAFETY: SSE2 is part of x86-64. The loads read, and the stores write, arrays of four values.
         unsafe {
             let half = _mm_set1_ps(0.5);
