@@ -2,10 +2,8 @@
 
 #[cfg(feature = "serde")]
 mod bounds;
-#[cfg(feature = "glam-034")]
-mod glam_034;
-#[cfg(feature = "mint")]
-mod mint;
+#[cfg(any(feature = "glam-034", feature = "mint"))]
+mod conversions;
 
 use crate::error::{BoxDefect, Error};
 
