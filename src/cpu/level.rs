@@ -1,22 +1,24 @@
 //! SIMD levels, and the proof that this CPU has one.
 
+use crate::named;
 use std::fmt;
-use std::str::FromStr;
 
 /// The environment variable that [`SimdLevel::in_use`] reads.
 const VARIABLE: &str = "SAPWISE_SIMD";
 
-/// A set of vector instructions. Each level includes the lower ones.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[non_exhaustive]
-pub enum SimdLevel {
-    /// The vectors that every CPU of the target has: SSE2 on x86-64, elsewhere those that the compiler makes of plain
-    /// Rust.
-    Portable,
-    /// 256-bit AVX2 of x86-64.
-    Avx2,
-    /// 512-bit AVX-512F of x86-64.
-    Avx512,
+named! {
+    /// A set of vector instructions. Each level includes the lower ones.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+    #[non_exhaustive]
+    pub enum SimdLevel("SIMD level") {
+        /// The vectors that every CPU of the target has: SSE2 on x86-64, elsewhere those that the compiler makes of
+        /// plain Rust.
+        Portable = "portable",
+        /// 256-bit AVX2 of x86-64.
+        Avx2 = "avx2",
+        /// 512-bit AVX-512F of x86-64.
+        Avx512 = "avx512",
+    }
 }
 
 /// Why a SIMD level can't be used.
@@ -38,9 +40,6 @@ pub enum SimdLevelError {
 }
 
 impl SimdLevel {
-    /// Every level, ascending.
-    pub const ALL: [Self; 3] = [Self::Portable, Self::Avx2, Self::Avx512];
-
     /// Returns the highest level that this CPU has.
     #[must_use]
     pub fn detected() -> Self {
@@ -69,7 +68,8 @@ impl SimdLevel {
             Err(_) => Ok(None),
             Ok(text) if text.is_empty() => Ok(None),
             Ok(text) => {
-                let (level, detected) = (text.parse()?, Self::detected());
+                let (level, detected) = (text.parse(), Self::detected());
+                let level = level.map_err(|_| SimdLevelError::Unknown { text })?;
                 if level > detected { Err(SimdLevelError::Unsupported { level, detected }) } else { Ok(Some(level)) }
             }
         }
@@ -83,25 +83,6 @@ impl SimdLevel {
             Self::Avx2 => 8,
             Self::Avx512 => 16,
         }
-    }
-}
-
-impl fmt::Display for SimdLevel {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Portable => "portable",
-            Self::Avx2 => "avx2",
-            Self::Avx512 => "avx512",
-        })
-    }
-}
-
-impl FromStr for SimdLevel {
-    type Err = SimdLevelError;
-
-    fn from_str(text: &str) -> Result<Self, SimdLevelError> {
-        let named = |level: &Self| level.to_string() == text;
-        Self::ALL.into_iter().find(named).ok_or_else(|| SimdLevelError::Unknown { text: text.to_owned() })
     }
 }
 
