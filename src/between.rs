@@ -38,8 +38,8 @@ const COLUMNS: usize = 512;
 pub struct Between {
     workers: Workers,
     simd: Simd,
-    /// One for each task, with its result.
-    columns: Vec<(Columns, Result<(), Error>)>,
+    /// One for each task.
+    columns: Vec<Columns>,
     tree: Tree,
     outputs: Outputs,
 }
@@ -87,16 +87,15 @@ impl Between {
             workers.check(a)?;
             workers.check(b).map_err(of_b)?;
             if columns.len() < workers.tasks() {
-                columns.resize_with(workers.tasks(), || (Columns::default(), Ok(())));
+                columns.resize_with(workers.tasks(), Columns::default);
             }
             outputs.collect(workers, pairs, |lists| {
                 let parts = lists.len();
-                workers.each_with(lists, columns, |k, list, (columns, result)| {
+                workers.try_each_of(lists.iter_mut().zip(columns).enumerate(), |(k, (list, columns))| {
                     let ids = part(many.len(), k, parts);
                     let many = (&many[ids.clone()], of_many + ids.start as u32);
-                    *result = compare(*simd, (few, of_few), many, columns, list);
-                });
-                columns[..parts].iter_mut().try_for_each(|(_, result)| std::mem::replace(result, Ok(())))
+                    compare(*simd, (few, of_few), many, columns, list)
+                })
             })?;
         } else {
             tree.build(workers, a, Members::From(0), &SceneStats::of(a), pairs.screen())?;

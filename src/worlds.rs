@@ -36,8 +36,8 @@ const BOXES_PER_BOX: usize = 4;
 pub struct Worlds {
     workers: Workers,
     simd: Simd,
-    /// One for each task, with its result.
-    searches: Vec<(WorldSearch, Result<(), Error>)>,
+    /// One for each task.
+    searches: Vec<WorldSearch>,
     outputs: Outputs,
     offsets: Vec<usize>,
 }
@@ -78,7 +78,7 @@ impl Worlds {
         offsets.try_reserve(starts.len()).map_err(refused)?;
         offsets.resize(starts.len(), 0);
         if searches.len() < workers.tasks() {
-            searches.resize_with(workers.tasks(), || (WorldSearch::new(*simd), Ok(())));
+            searches.resize_with(workers.tasks(), || WorldSearch::new(*simd));
         }
         let found = outputs.collect(workers, pairs, |lists| find(workers, boxes, starts, searches, offsets, lists));
         let found = found.and_then(|()| pairs.finish_on(workers));
@@ -124,7 +124,7 @@ fn find(
     workers: &Workers,
     boxes: &[Aabb],
     starts: &[usize],
-    searches: &mut [(WorldSearch, Result<(), Error>)],
+    searches: &mut [WorldSearch],
     offsets: &mut [usize],
     lists: &mut [Pairs],
 ) -> Result<(), Error> {
@@ -134,20 +134,19 @@ fn find(
     let before = |first: usize| starts.partition_point(|&start| start < first);
     let cut = |k: usize| if k == parts { worlds } else { before(part(boxes.len(), k, parts).start) };
     let mut rest = &mut *begins;
-    let tasks = lists.iter_mut().zip(&mut *searches).enumerate().map(|(k, (list, search))| {
+    let tasks = lists.iter_mut().zip(searches).enumerate().map(|(k, (list, search))| {
         let (begins, behind) = std::mem::take(&mut rest).split_at_mut(cut(k + 1) - cut(k));
         rest = behind;
         (&starts[cut(k)..], begins, list, search)
     });
-    workers.each_of(tasks, |(starts, begins, list, (search, result))| {
-        *result = begins.iter_mut().zip(starts.windows(2)).try_for_each(|(begin, world)| {
+    workers.try_each_of(tasks, |(starts, begins, list, search)| {
+        begins.iter_mut().zip(starts.windows(2)).try_for_each(|(begin, world)| {
             *begin = list.len();
             search.find(boxes, world[0]..world[1], list)
-        });
-    });
+        })
+    })?;
     *end = 0;
-    for (k, (list, (_, result))) in lists.iter().zip(searches).enumerate() {
-        std::mem::replace(result, Ok(()))?;
+    for (k, list) in lists.iter().enumerate() {
         begins[cut(k)..cut(k + 1)].iter_mut().for_each(|begin| *begin += *end);
         *end += list.len();
     }

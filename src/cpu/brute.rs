@@ -6,7 +6,8 @@ use crate::cpu::Threads;
 use crate::cpu::columns::{Columns, ensure};
 use crate::cpu::kernel::brute_rows;
 use crate::cpu::level::Simd;
-use crate::cpu::workers::{Outputs, Workers};
+use crate::cpu::outputs::Outputs;
+use crate::cpu::workers::Workers;
 use crate::error::Error;
 use crate::filter::Screen;
 use crate::pairs::Pairs;
@@ -44,7 +45,7 @@ impl BroadPhase for Brute {
         let _frame = workers.frame();
         workers.check(boxes)?;
         let active = active_first(order, pairs.screen(), boxes.len())?;
-        workers.fill(columns.as_mut(), |first, mut part| {
+        workers.fill(columns, |first, mut part| {
             for at in 0..part.len() {
                 let id = if active.is_some() { order[first + at] } else { (first + at) as u32 };
                 part.set(at, &boxes[id as usize], 0, id);

@@ -56,9 +56,21 @@ impl Columns {
             begins: &mut self.begins[..len],
         }
     }
+
+    /// The boxes in parts of this length, open for writing.
+    pub(crate) fn parts(&mut self, size: usize) -> impl Iterator<Item = ColumnsMut<'_>> + Send {
+        let ColumnsMut { low, high, ids, begins } = self.as_mut();
+        let (mut low, mut high) = (low.map(|c| c.chunks_mut(size)), high.map(|c| c.chunks_mut(size)));
+        ids.chunks_mut(size).zip(begins.chunks_mut(size)).map(move |(ids, begins)| ColumnsMut {
+            low: low.each_mut().map(|c| c.next().unwrap_or_default()),
+            high: high.each_mut().map(|c| c.next().unwrap_or_default()),
+            ids,
+            begins,
+        })
+    }
 }
 
-impl<'a> ColumnsMut<'a> {
+impl ColumnsMut<'_> {
     pub(crate) fn len(&self) -> usize {
         self.ids.len()
     }
@@ -73,31 +85,17 @@ impl<'a> ColumnsMut<'a> {
         }
         self.ids[at] = id;
     }
-
-    /// Splits the columns before `middle`.
-    #[cfg(feature = "parallel")]
-    pub(crate) fn split(self, middle: usize) -> (ColumnsMut<'a>, ColumnsMut<'a>) {
-        let cut = |v: &'a mut [f32]| v.split_at_mut(middle);
-        let [(a0, a1), (b0, b1), (c0, c1)] = self.low.map(cut);
-        let [(d0, d1), (e0, e1), (f0, f1)] = self.high.map(cut);
-        let (i0, i1) = self.ids.split_at_mut(middle);
-        let (g0, g1) = self.begins.split_at_mut(middle);
-        (
-            ColumnsMut { low: [a0, b0, c0], high: [d0, e0, f0], ids: i0, begins: g0 },
-            ColumnsMut { low: [a1, b1, c1], high: [d1, e1, f1], ids: i1, begins: g1 },
-        )
-    }
 }
 
 /// Grows `list` to at least `len` elements, and by a sixteenth more. Reports a refused allocation.
 ///
 /// It never shrinks, and its elements stay initialised, so that a steady state writes each element once. `Vec` alone
 /// would double its memory, which no frame of that size needs.
-pub(crate) fn ensure<T: Clone + Default>(list: &mut Vec<T>, len: usize, what: &'static str) -> Result<(), Error> {
+pub(crate) fn ensure<T: Default>(list: &mut Vec<T>, len: usize, what: &'static str) -> Result<(), Error> {
     if list.len() < len {
         let len = len + len / 16;
         list.try_reserve_exact(len - list.len()).map_err(|_| Error::OutOfMemory { what, elements: len })?;
-        list.resize(len, T::default());
+        list.resize_with(len, T::default);
     }
     Ok(())
 }

@@ -24,8 +24,9 @@ use crate::cpu::columns::{Columns, ensure, order_key, part};
 use crate::cpu::kernel::node::{Group, LANES};
 use crate::cpu::kernel::sweep_rows;
 use crate::cpu::level::Simd;
+use crate::cpu::outputs::Outputs;
 use crate::cpu::tree::{Members, Tree};
-use crate::cpu::workers::{Outputs, Workers};
+use crate::cpu::workers::Workers;
 use crate::error::Error;
 use crate::filter::Screen;
 use crate::load::{FramePlan, SceneStats, StripGrid, StripSpan};
@@ -70,8 +71,6 @@ struct Bins {
     /// Positions in the input of the boxes that go into the tree. The first `apart_count` are of this frame.
     apart: Vec<u32>,
     apart_count: usize,
-    /// The error of this frame, reported after the phase.
-    error: Option<Error>,
 }
 
 /// A box in a bin.
@@ -89,7 +88,6 @@ struct Task {
     entries: Vec<Entry>,
     keys: Vec<u64>,
     columns: Columns,
-    error: Option<Error>,
 }
 
 pub(super) fn create(threads: u32, pools: &Threads, simd: Simd) -> Result<Box<dyn BroadPhase>, Error> {
@@ -119,10 +117,9 @@ impl BroadPhase for GridSap {
         let _frame = workers.frame();
         let threads = workers.threads();
         let (bins, tasks) = (&mut bins[..threads], &mut tasks[..workers.tasks()]);
-        workers.each(bins, |k, bin| {
-            bin.error = bin.fill(&grid, boxes, part(boxes.len(), k, threads), threads, screen).err();
-        });
-        bins.iter_mut().find_map(|b| b.error.take()).map_or(Ok(()), Err)?;
+        workers.try_each_of(bins.iter_mut().enumerate(), |(k, bin)| {
+            bin.fill(&grid, boxes, part(boxes.len(), k, threads), threads, screen)
+        })?;
         apart.clear();
         let count = bins.iter().map(|b| b.apart_count).sum();
         apart.try_reserve(count).map_err(|_| Error::OutOfMemory { what: "boxes in a tree", elements: count })?;
@@ -135,14 +132,12 @@ impl BroadPhase for GridSap {
         };
         let (bins, strips, count) = (&*bins, grid.strips(), tasks.len());
         outputs.collect(workers, pairs, |lists| {
-            workers.each_with(tasks, lists, |k, task, list| {
+            workers.try_each_of(tasks.iter_mut().zip(lists).enumerate(), |(k, (task, list))| {
                 let strips = balanced(bins, strips, k, count)..balanced(bins, strips, k + 1, count);
-                task.error = task.find(bins, tree, grid.axis, strips, *simd, list).err();
-                if let Some(tree) = tree {
-                    tree.self_pairs(k, count, list);
-                }
-            });
-            tasks.iter_mut().find_map(|t| t.error.take()).map_or(Ok(()), Err)
+                task.find(bins, tree, grid.axis, strips, *simd, list)?;
+                tree.into_iter().for_each(|tree| tree.self_pairs(k, count, list));
+                Ok(())
+            })
         })?;
         pairs.finish_on(workers)
     }

@@ -9,6 +9,7 @@ mod helpers;
 mod kernel;
 mod level;
 mod mean_time;
+mod outputs;
 mod pair_cache;
 #[cfg(feature = "parallel")]
 mod phases;
@@ -28,11 +29,11 @@ pub(crate) use kernel::brute_rows;
 pub(crate) use kernel::node::{Group, LANES};
 pub(crate) use level::Simd;
 pub use level::{SimdLevel, SimdLevelError};
+pub(crate) use outputs::Outputs;
 pub(crate) use pair_cache::GrownTree;
 pub use threads::Threads;
 pub(crate) use tree::Members;
 pub use tree::{Near, Tree};
-pub(crate) use workers::Outputs;
 pub use workers::Workers;
 pub(crate) use world::WorldSearch;
 

@@ -8,8 +8,9 @@ use crate::cpu::Threads;
 use crate::cpu::columns::{Columns, ensure, order_key, part};
 use crate::cpu::kernel::sweep_rows;
 use crate::cpu::level::Simd;
+use crate::cpu::outputs::Outputs;
 use crate::cpu::sort::sort;
-use crate::cpu::workers::{Outputs, Workers};
+use crate::cpu::workers::Workers;
 use crate::error::Error;
 use crate::load::FramePlan;
 use crate::pairs::Pairs;
@@ -56,7 +57,7 @@ impl BroadPhase for Sap {
         let keys = &mut keys[..boxes.len()];
         workers.map(boxes, keys, |id, b| u64::from(order_key(b.min[axis])) << 32 | id as u64);
         sort(workers, keys, scratch)?;
-        workers.fill(columns.as_mut(), |first, mut rows| {
+        workers.fill(columns, |first, mut rows| {
             for at in 0..rows.len() {
                 let id = keys[first + at] as u32;
                 rows.set(at, &boxes[id as usize], axis, id);

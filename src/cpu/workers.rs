@@ -4,16 +4,12 @@ use crate::aabb::Aabb;
 #[cfg(feature = "parallel")]
 use crate::algorithm::AlgorithmId;
 use crate::cpu::Threads;
-use crate::cpu::columns::ColumnsMut;
+use crate::cpu::columns::{Columns, ColumnsMut};
 #[cfg(feature = "parallel")]
 use crate::cpu::helpers::Helpers;
 use crate::error::Error;
-use crate::pairs::{Pairs, Parallel};
-use std::sync::{
-    Arc,
-    atomic::{AtomicBool, Ordering},
-};
 #[cfg(feature = "parallel")]
+use std::sync::Arc;
 use std::sync::{Mutex, PoisonError};
 
 /// The threads of one algorithm: the calling one, and its helpers from a pool.
@@ -54,9 +50,6 @@ const SMALLEST_TASK: usize = BOXES_PER_THREAD / 2;
 
 /// Fewest boxes that a task of a filling phase writes: a smaller task costs more than it saves.
 const SMALLEST_FILL: usize = 1024;
-
-/// Fewest pairs that all threads join: fewer are copied in less time than a phase takes.
-const SMALLEST_JOIN: usize = 16_384;
 
 impl Workers {
     /// Makes `threads` threads for the algorithm `method`.
@@ -139,47 +132,28 @@ impl Workers {
         self.each_of(tasks.iter_mut().enumerate(), |(k, task)| work(k, task));
     }
 
-    /// Runs one phase: `work` on every task and its element of `with`.
-    pub fn each_with<T: Send, U: Send>(
+    /// Runs one phase of tasks that may fail. All are worked on; returns the error of the first that failed.
+    pub(crate) fn try_each_of<I: Iterator<Item: Send> + Send>(
         &self,
-        tasks: &mut [T],
-        with: &mut [U],
-        work: impl Fn(usize, &mut T, &mut U) + Sync,
-    ) {
-        self.each_of(tasks.iter_mut().zip(with).enumerate(), |(k, (task, with))| work(k, task, with));
-    }
-
-    /// Runs one phase: `work` on every task and its parts of two lists, each given with the length of a part.
-    pub fn each_share<T: Send, A: Send, B: Send>(
-        &self,
-        tasks: &mut [T],
-        (a, a_len): (&mut [A], usize),
-        (b, b_len): (&mut [B], usize),
-        work: impl Fn(usize, &mut T, &mut [A], &mut [B]) + Sync,
-    ) {
-        let parts = a.chunks_mut(a_len).zip(b.chunks_mut(b_len));
-        self.each_of(tasks.iter_mut().zip(parts).enumerate(), |(k, (task, (a, b)))| work(k, task, a, b));
+        tasks: I,
+        work: impl Fn(I::Item) -> Result<(), Error> + Sync,
+    ) -> Result<(), Error> {
+        let first: Mutex<Option<(usize, Error)>> = Mutex::new(None);
+        self.each_of(tasks.enumerate(), |(k, task)| {
+            if let Err(error) = work(task) {
+                let mut first = first.lock().unwrap_or_else(PoisonError::into_inner);
+                if first.as_ref().is_none_or(|(known, _)| k < *known) {
+                    *first = Some((k, error));
+                }
+            }
+        });
+        first.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), |(_, error)| Err(error))
     }
 
     /// Runs one phase: `fill` on parts of the columns, each with its first position.
-    pub(crate) fn fill(&self, columns: ColumnsMut<'_>, fill: impl Fn(usize, ColumnsMut<'_>) + Sync) {
-        #[cfg(feature = "parallel")]
-        if self.helpers.is_some() {
-            let size = self.part_of(columns.len());
-            let count = columns.len().div_ceil(size);
-            let (mut rest, mut first) = (Some(columns), 0);
-            let parts = std::iter::from_fn(|| {
-                let columns = rest.take().filter(|c| c.len() > 0)?;
-                let at = first;
-                let whole = columns.len();
-                let (part, behind) = columns.split(size.min(whole));
-                first += part.len();
-                rest = Some(behind);
-                Some((at, part))
-            });
-            return self.each_of(parts.take(count), |(first, part)| fill(first, part));
-        }
-        fill(0, columns);
+    pub(crate) fn fill(&self, columns: &mut Columns, fill: impl Fn(usize, ColumnsMut<'_>) + Sync) {
+        let size = self.part_of(columns.len());
+        self.each_of(columns.parts(size).zip((0..).step_by(size)), |(part, first)| fill(first, part));
     }
 
     /// Runs one phase: writes `make` of every input, with its position, to `out`.
@@ -196,108 +170,9 @@ impl Workers {
     }
 
     /// Runs one phase: returns the error for the first invalid box, if there is one.
-    pub fn check(&self, boxes: &[Aabb]) -> Result<(), Error> {
-        #[cfg(feature = "parallel")]
-        if self.helpers.is_some() {
-            let size = self.part_of(boxes.len());
-            // The parts join their lowest positions under a lock: errors are rare.
-            let first = Mutex::new(usize::MAX);
-            self.each_of(boxes.chunks(size).zip((0..).step_by(size)), |(part, at)| {
-                if let Some(k) = part.iter().position(|b| b.defect().is_some()) {
-                    let mut first = first.lock().unwrap_or_else(PoisonError::into_inner);
-                    *first = (*first).min(at + k);
-                }
-            });
-            let first = first.into_inner().unwrap_or_else(PoisonError::into_inner);
-            return boxes.get(first..).map_or(Ok(()), |rest| Aabb::check(rest, first));
-        }
-        Aabb::check(boxes, 0)
-    }
-}
-
-impl Parallel for Workers {
-    fn threads(&self) -> usize {
-        self.threads
-    }
-
-    fn each_of<I: Iterator<Item: Send> + Send>(&self, tasks: I, work: impl Fn(I::Item) + Sync) {
-        Self::each_of(self, tasks, work);
-    }
-}
-
-/// The pairs that the tasks find.
-#[derive(Debug, Default)]
-pub(crate) struct Outputs {
-    /// One list for each task.
-    lists: Vec<Pairs>,
-    /// Whether a list has exceeded the limit in this frame.
-    any_over: Arc<AtomicBool>,
-}
-
-impl Outputs {
-    /// Returns one list for each task of `workers`, empty and under the caller's limit and filter. Lists of more tasks
-    /// stay for later frames.
-    fn ready(&mut self, workers: &Workers, pairs: &Pairs) -> &mut [Pairs] {
-        if self.lists.len() < workers.tasks() {
-            self.lists.resize_with(workers.tasks(), Pairs::new);
-        }
-        let lists = &mut self.lists[..workers.tasks()];
-        self.any_over.store(false, Ordering::Relaxed);
-        lists.iter_mut().for_each(|list| list.begin_part(pairs, &self.any_over));
-        lists
-    }
-
-    /// Lets `find` fill one list for each task of `workers`, then joins them in order. With one thread the one list is
-    /// the caller's.
-    pub(crate) fn collect(
-        &mut self,
-        workers: &Workers,
-        pairs: &mut Pairs,
-        find: impl FnOnce(&mut [Pairs]) -> Result<(), Error>,
-    ) -> Result<(), Error> {
-        if workers.threads() == 1 {
-            return find(std::slice::from_mut(pairs));
-        }
-        let lists = self.ready(workers, pairs);
-        let found = find(lists);
-        if found.is_ok() {
-            Self::join(lists, workers, pairs);
-        }
-        lists.iter_mut().for_each(Pairs::end_part);
-        found
-    }
-
-    /// Copies all lists behind each other, in one phase if that pays.
-    fn join(lists: &[Pairs], workers: &Workers, pairs: &mut Pairs) {
-        let total: usize = lists.iter().map(Pairs::len).sum();
-        let complete = lists.iter().all(Pairs::is_complete);
-        if let Some(mut room) = pairs.room(total).filter(|_| complete && total >= SMALLEST_JOIN) {
-            let parts = lists.iter().map(|list| {
-                let (to, behind) = std::mem::take(&mut room).split_at_mut(list.len());
-                room = behind;
-                (to, list)
-            });
-            workers.each_of(parts, |(to, list)| to.copy_from_slice(list.as_slice()));
-            pairs.extend_by_parts(lists);
-        } else {
-            lists.iter().for_each(|list| pairs.append(list));
-        }
-    }
-
-    /// Runs one phase: `find` on every part, each into its own list, then joins the lists in order. `find` gets the
-    /// number of the part and the number of parts.
-    pub(crate) fn find(
-        &mut self,
-        workers: &Workers,
-        pairs: &mut Pairs,
-        find: impl Fn(usize, usize, &mut Pairs) + Sync + Send,
-    ) {
-        let found = self.collect(workers, pairs, |lists| {
-            let parts = lists.len();
-            workers.each(lists, |k, list| find(k, parts, list));
-            Ok(())
-        });
-        debug_assert!(found.is_ok(), "the closure returns Ok");
+    pub(crate) fn check(&self, boxes: &[Aabb]) -> Result<(), Error> {
+        let size = self.part_of(boxes.len());
+        self.try_each_of(boxes.chunks(size).zip((0..).step_by(size)), |(part, first)| Aabb::check(part, first))
     }
 }
 
@@ -306,6 +181,7 @@ mod tests {
     use super::*;
     use crate::cpu::level::{Simd, SimdLevel};
     use crate::cpu::{Create, METHODS};
+    use crate::pairs::Pairs;
     use crate::splitmix::mix;
     use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
     use std::sync::mpsc;

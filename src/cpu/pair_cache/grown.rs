@@ -18,18 +18,11 @@ pub(super) const NOTHING: Aabb = Aabb::new([f32::INFINITY; 3], [f32::NEG_INFINIT
 pub(super) struct Grown {
     boxes: Vec<Aabb>,
     len: usize,
-    /// One for each 64 boxes.
-    flags: Vec<Flags>,
+    /// One bit for each box: it got a new grown box in this frame, or was removed.
+    dirty: Vec<u64>,
     /// Those by which the kept pairs were found; empty without a filter.
     memberships: Vec<Membership>,
     simd: Simd,
-}
-
-/// One bit for each of 64 boxes.
-#[derive(Debug, Clone, Copy, Default)]
-struct Flags {
-    /// The box got a new grown box in this frame, or was removed.
-    dirty: u64,
 }
 
 /// The growth of a box on each side, as a share of its mean edge.
@@ -47,7 +40,6 @@ pub(super) struct Share {
     pub(super) left: Vec<u32>,
     /// Those of them whose new grown box does not overlap the old one, new boxes included.
     pub(super) far: Vec<u32>,
-    error: Option<Error>,
 }
 
 /// The differences between a frame and the previous one.
@@ -65,7 +57,7 @@ pub(super) struct Changes {
 
 impl Grown {
     pub(super) fn new(simd: Simd) -> Self {
-        Self { boxes: Vec::new(), len: 0, flags: Vec::new(), memberships: Vec::new(), simd }
+        Self { boxes: Vec::new(), len: 0, dirty: Vec::new(), memberships: Vec::new(), simd }
     }
 
     pub(super) fn as_slice(&self) -> &[Aabb] {
@@ -80,10 +72,10 @@ impl Grown {
     /// Reserves memory for `objects` boxes.
     pub(super) fn reserve(&mut self, objects: usize) -> Result<(), Error> {
         ensure(&mut self.boxes, objects, "grown boxes")?;
-        ensure(&mut self.flags, objects.div_ceil(64) + 1, "grown boxes")
+        ensure(&mut self.dirty, objects.div_ceil(64) + 1, "grown boxes")
     }
 
-    /// Returns the number of boxes of a task: a multiple of 64, so that no two tasks share a word of flags.
+    /// Returns the number of boxes of a task: a multiple of 64, so that no two tasks share a word of bits.
     fn share_len(&self, tasks: usize) -> usize {
         self.len.div_ceil(tasks).next_multiple_of(64).max(64)
     }
@@ -115,22 +107,18 @@ impl Grown {
         self.update_memberships(workers, filter)?;
         let size = self.share_len(shares.len());
         for share in shares.iter_mut() {
-            // A task without a part in this frame must not report the previous one.
-            share.error = None;
             share.left.clear();
             share.far.clear();
         }
         let simd = self.simd;
-        let grown = (&mut self.boxes[..self.len], size);
-        let flags = (&mut self.flags[..self.len.div_ceil(64)], size / 64);
-        workers.each_share(shares, grown, flags, |k, share, grown, flags| {
+        let parts = self.boxes[..self.len].chunks_mut(size).zip(self.dirty.chunks_mut(size / 64));
+        workers.try_each_of(shares.iter_mut().zip(parts).enumerate(), |(k, (share, (grown, dirty)))| {
             let first = k * size;
-            share.error = share.check(&boxes[first..first + grown.len()], grown, flags, first, margin, simd).err();
-        });
-        shares.iter_mut().find_map(|s| s.error.take()).map_or(Ok(()), Err)?;
+            share.check(&boxes[first..first + grown.len()], grown, dirty, first, margin, simd)
+        })?;
         // Drops the kept pairs of removed boxes with those of the boxes that left.
         for id in gone.clone() {
-            self.flags[id / 64].dirty |= 1 << (id % 64);
+            self.dirty[id / 64] |= 1 << (id % 64);
         }
         let left = shares.iter().map(|s| s.left.len()).sum::<usize>() + gone.len();
         let jumped = shares.iter().map(|s| s.far.len()).sum::<usize>() + gone.len();
@@ -141,13 +129,9 @@ impl Grown {
     pub(super) fn grow_all(&mut self, workers: &Workers, boxes: &[Aabb], margin: Margin, shares: &mut [Share]) {
         let size = self.share_len(shares.len());
         shares.iter_mut().for_each(|share| share.left.clear());
-        let (grown, flags) =
-            ((&mut self.boxes[..self.len], size), (&mut self.flags[..self.len.div_ceil(64)], size / 64));
-        workers.each_share(shares, grown, flags, |k, _, grown, flags| {
-            flags.iter_mut().for_each(|flags| flags.dirty = 0);
-            for (grown, b) in grown.iter_mut().zip(&boxes[k * size..]) {
-                *grown = margin.grow(b);
-            }
+        self.dirty.fill(0);
+        workers.each_of(self.boxes[..self.len].chunks_mut(size).zip(boxes.chunks(size)), |(grown, boxes)| {
+            grown.iter_mut().zip(boxes).for_each(|(grown, b)| *grown = margin.grow(b));
         });
     }
 
@@ -202,7 +186,7 @@ impl Grown {
     /// Returns whether a box got a new grown box or was removed.
     #[inline(always)]
     fn is_new(&self, id: u32) -> bool {
-        self.flags[id as usize / 64].dirty >> (id % 64) & 1 == 1
+        self.dirty[id as usize / 64] >> (id % 64) & 1 == 1
     }
 }
 
@@ -211,12 +195,12 @@ impl Share {
         &mut self,
         boxes: &[Aabb],
         grown: &mut [Aabb],
-        flags: &mut [Flags],
+        dirty: &mut [u64],
         first: usize,
         margin: Margin,
         simd: Simd,
     ) -> Result<(), Error> {
-        flags.iter_mut().for_each(|flags| flags.dirty = 0);
+        dirty.fill(0);
         let mut invalid = None;
         each_doubtful_block(simd, boxes, grown, |at, block| {
             for (k, grown) in block.iter_mut().enumerate() {
@@ -233,7 +217,7 @@ impl Share {
                 if before == NOTHING || !before.overlaps(grown) {
                     self.far.push((first + at + k) as u32);
                 }
-                flags[(at + k) / 64].dirty |= 1 << ((at + k) % 64);
+                dirty[(at + k) / 64] |= 1 << ((at + k) % 64);
                 self.left.push((first + at + k) as u32);
             }
         });
