@@ -1,7 +1,8 @@
 //! The pairs that began and ended between two frames.
 
+use crate::cpu::Workers;
 use crate::error::Error;
-use crate::pairs::{Alone, Pairs, Sorter};
+use crate::pairs::{Pairs, Sorter};
 
 /// Follows pairs from frame to frame by the caller's ids: the pairs that began, those that ended, and all of them.
 ///
@@ -170,7 +171,7 @@ fn fill_keys(
             keys.push(u64::from(a.min(b)) << 32 | u64::from(a.max(b)));
         }
     }
-    sorter.sort(&Alone, keys);
+    sorter.sort(&Workers::one(), keys);
     keys.dedup();
     Ok(())
 }

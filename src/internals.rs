@@ -9,7 +9,6 @@ pub use crate::cpu::{Near, Threads, Tree, Workers};
 pub use crate::gpu_identity::{GpuIdentity, GpuKind};
 pub use crate::load::{SampledBoxes, SceneStats, StripGrid};
 pub use crate::pair::Pair;
-pub use crate::pairs::Parallel;
 pub use crate::ray::{Ray, RayDefect};
 pub use crate::{splitmix, stats};
 #[cfg(feature = "schema")]

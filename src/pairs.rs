@@ -3,6 +3,7 @@
 mod fill;
 mod order;
 
+use crate::cpu::Workers;
 use crate::error::Error;
 use crate::filter::{Filter, Screen};
 use crate::pair::Pair;
@@ -11,8 +12,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 pub(crate) use fill::each_bit;
-pub use order::Parallel;
-pub(crate) use order::{Alone, Sorter};
+pub(crate) use order::Sorter;
 
 /// The order in which a caller wants the pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -185,12 +185,12 @@ impl Pairs {
     /// # Errors
     /// [`Error::TooManyPairs`] and [`Error::OutOfMemory`].
     pub fn finish(&mut self) -> Result<(), Error> {
-        self.finish_on(&Alone)
+        self.finish_on(&Workers::one())
     }
 
     /// Does the same as [`finish`](Self::finish), on several threads if that pays.
     #[doc(hidden)]
-    pub fn finish_on(&mut self, threads: &impl Parallel) -> Result<(), Error> {
+    pub fn finish_on(&mut self, threads: &Workers) -> Result<(), Error> {
         if let Some(elements) = self.refused {
             return Err(Error::OutOfMemory { what: "pairs", elements });
         }

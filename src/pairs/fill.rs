@@ -1,6 +1,7 @@
 //! How the built-in algorithms write pairs: in blocks, through the filter, from the lists of their tasks.
 
-use super::{Pairs, Parallel};
+use super::Pairs;
+use crate::cpu::Workers;
 use crate::error::Error;
 use crate::pair::Pair;
 use std::sync::Arc;
@@ -136,7 +137,7 @@ impl Pairs {
 
     /// Appends the wanted ones of pairs that stand lower member first.
     #[doc(hidden)]
-    pub fn extend(&mut self, pairs: &[[u32; 2]], threads: &impl Parallel) -> Result<(), Error> {
+    pub fn extend(&mut self, pairs: &[[u32; 2]], threads: &Workers) -> Result<(), Error> {
         if self.filter.is_none() {
             self.reserve(self.len + pairs.len())?;
             if let Some(room) = self.room(pairs.len()) {

@@ -4,6 +4,7 @@
 //! Within a bucket only the rest of a key counts. It usually has 32 bits, which halves the bytes moved. With several
 //! threads, each first sorts its own share into buckets, and then all shares of a bucket are joined.
 
+use crate::cpu::Workers;
 use crate::pair::Pair;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
@@ -51,27 +52,6 @@ impl Keyed for u32 {
     }
 }
 
-/// The threads that sort.
-pub trait Parallel {
-    /// Returns the number of threads, the calling one included.
-    fn threads(&self) -> usize;
-    /// Runs `work` on every task, and returns when all are done.
-    fn each_of<I: Iterator<Item: Send> + Send>(&self, tasks: I, work: impl Fn(I::Item) + Sync);
-}
-
-/// The calling thread.
-pub(crate) struct Alone;
-
-impl Parallel for Alone {
-    fn threads(&self) -> usize {
-        1
-    }
-
-    fn each_of<I: Iterator<Item: Send> + Send>(&self, tasks: I, work: impl Fn(I::Item) + Sync) {
-        tasks.for_each(work);
-    }
-}
-
 /// Fewest elements for a radix sort: with fewer, its counters cost more than comparing.
 const FEW: usize = 256;
 
@@ -109,7 +89,7 @@ impl Clone for Sorter {
 
 impl Sorter {
     /// Sorts a list.
-    pub(crate) fn sort<T: Keyed>(&mut self, on: &impl Parallel, list: &mut [T]) {
+    pub(crate) fn sort<T: Keyed>(&mut self, on: &Workers, list: &mut [T]) {
         // Brute force and GPUs often return sorted pairs, and so does a lookup of canonical pairs in ascending ids.
         if list.is_sorted_by_key(|t| t.key()) {
             return;
@@ -117,7 +97,7 @@ impl Sorter {
         let sorted = if list.len() < FEW || u32::try_from(list.len()).is_err() {
             None
         } else if list.len() < SMALLEST_SHARED || on.threads() == 1 {
-            self.sort_on(&Alone, list)
+            self.sort_on(&Workers::one(), list)
         } else {
             self.sort_on(on, list)
         };
@@ -128,7 +108,7 @@ impl Sorter {
     }
 
     /// Returns `None`, and does nothing, if memory is refused.
-    fn sort_on<T: Keyed>(&mut self, on: &impl Parallel, list: &mut [T]) -> Option<()> {
+    fn sort_on<T: Keyed>(&mut self, on: &Workers, list: &mut [T]) -> Option<()> {
         let Self { narrow, wide, starts } = self;
         let layout = Layout::of(on, list);
         let len = list.len();
@@ -161,7 +141,7 @@ struct Layout {
 }
 
 impl Layout {
-    fn of<T: Keyed>(on: &impl Parallel, list: &[T]) -> Self {
+    fn of<T: Keyed>(on: &Workers, list: &[T]) -> Self {
         let (high, low) = (AtomicU32::new(0), AtomicU32::new(0));
         on.each_of(list.chunks(list.len().div_ceil(on.threads())), |list| {
             let halves = |t: &T| ((t.key() >> 32) as u32, t.key() as u32);
@@ -208,13 +188,7 @@ impl Layout {
 }
 
 /// Sorts `list` with the buffer `rests`, which has its length. The length of `starts` determines the number of shares.
-fn by_buckets<T: Keyed, K: Keyed>(
-    on: &impl Parallel,
-    list: &mut [T],
-    rests: &mut [K],
-    starts: &mut [u32],
-    layout: Layout,
-) {
+fn by_buckets<T: Keyed, K: Keyed>(on: &Workers, list: &mut [T], rests: &mut [K], starts: &mut [u32], layout: Layout) {
     if layout.buckets == 1 {
         return sort_bucket(list, rests, true, 0, layout);
     }
@@ -318,28 +292,18 @@ fn sort_bucket<T: Keyed, K: Keyed>(list: &mut [T], rests: &mut [K], mut whole: b
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cpu::Threads;
     use crate::splitmix::mix;
 
-    /// Several threads, played by one.
-    struct Several(usize);
-
-    impl Parallel for Several {
-        fn threads(&self) -> usize {
-            self.0
-        }
-
-        fn each_of<I: Iterator<Item: Send> + Send>(&self, tasks: I, work: impl Fn(I::Item) + Sync) {
-            tasks.for_each(work);
-        }
-    }
-
     fn assert_sorts<T: Keyed + PartialEq>(list: &[T], what: &str) {
-        for threads in [1, 2, 3, 7] {
+        let threads: &[u32] = if cfg!(feature = "parallel") { &[1, 2, 3, 7] } else { &[1] };
+        for &threads in threads {
+            let workers = Workers::new("sort", threads, &Threads::default()).unwrap();
             // The second and third time with used buffers.
             let mut sorter = Sorter::default();
             for len in [list.len(), list.len() / 2, list.len()] {
                 let mut sorted = list[..len].to_vec();
-                sorter.sort(&Several(threads), &mut sorted);
+                sorter.sort(&workers, &mut sorted);
                 let mut expected = list[..len].to_vec();
                 expected.sort_by_key(|t| t.key());
                 assert!(sorted == expected, "{what}, {len} on {threads} threads");

@@ -3,8 +3,8 @@
 use super::{FEWEST, Handle, IDLE, MANY, Space};
 use crate::broad_phase::BroadPhase;
 use crate::changes::differences;
+use crate::cpu::Workers;
 use crate::error::Error;
-use crate::pairs::Alone;
 use crate::space::slots::{At, REMOVED, SET_BODY, Slots};
 
 /// Makes the key of a pair of slots, the lower one in the upper half.
@@ -44,7 +44,7 @@ impl Space {
             self.wake_all();
         }
         if self.before.len() > known {
-            self.sorter.sort(&Alone, &mut self.before);
+            self.sorter.sort(&Workers::one(), &mut self.before);
         }
         self.find()?;
         self.compare()?;
@@ -181,7 +181,7 @@ impl Space {
                 }
             });
         }
-        sorter.sort(&Alone, keys);
+        sorter.sort(&Workers::one(), keys);
         Ok(())
     }
 

@@ -24,8 +24,8 @@ const SMALLEST_SPLIT: usize = 1024;
 #[derive(Debug)]
 pub(crate) struct GrownTree {
     tree: Tree,
-    /// The place of each box in the tree.
-    place_of: Vec<Place>,
+    /// The place of each box in the tree, which any thread may write.
+    place_of: Vec<AtomicU32>,
     /// One bit for each box that is out of the tree, while others are sorted anew.
     out: Vec<u64>,
     /// The moved boxes: place in the upper half, position in the input in the lower.
@@ -34,16 +34,6 @@ pub(crate) struct GrownTree {
     scratch: Vec<u64>,
     /// The bounds of the moved boxes below each parent of leaves, if they changed its bounds; nothing after a refit.
     widened: Vec<Aabb>,
-}
-
-/// A place that any thread may write.
-#[derive(Debug, Default)]
-struct Place(AtomicU32);
-
-impl Clone for Place {
-    fn clone(&self) -> Self {
-        Self(AtomicU32::new(self.0.load(Relaxed)))
-    }
 }
 
 impl GrownTree {
@@ -104,7 +94,7 @@ impl GrownTree {
             }
         }
         let place_of = &mut self.place_of;
-        self.tree.insert(boxes, far, screen, |place, id| *place_of[id as usize].0.get_mut() = place as u32)?;
+        self.tree.insert(boxes, far, screen, |place, id| *place_of[id as usize].get_mut() = place as u32)?;
         Ok(renewed)
     }
 
@@ -126,7 +116,7 @@ impl GrownTree {
         let size = ids.len().div_ceil(workers.tasks()).max(SMALLEST_SPLIT);
         workers.each_of(ids.chunks(size).zip((0..).step_by(size)), |(ids, first)| {
             for (place, &id) in (first..).zip(ids).filter(|&(_, &id)| id != NOBODY) {
-                place_of[id as usize].0.store(place as u32, Relaxed);
+                place_of[id as usize].store(place as u32, Relaxed);
             }
         });
         Ok(())
@@ -149,7 +139,7 @@ impl GrownTree {
 
     /// Removes a box.
     pub(crate) fn remove(&mut self, id: u32) {
-        self.tree.remove(*self.place_of[id as usize].0.get_mut() as usize);
+        self.tree.remove(*self.place_of[id as usize].get_mut() as usize);
     }
 
     /// Refits the tree to the moved boxes, which have the bounds `boxes[id]` now.
@@ -175,7 +165,7 @@ impl GrownTree {
         let place_of = &self.place_of;
         workers.each_of(parts, |(keys, moved)| {
             for (key, &id) in keys.iter_mut().zip(moved) {
-                *key = u64::from(place_of[id as usize].0.load(Relaxed)) << 32 | u64::from(id);
+                *key = u64::from(place_of[id as usize].load(Relaxed)) << 32 | u64::from(id);
             }
         });
         // Sorts by place: the nodes of one box are then in the cache for the next.
