@@ -84,7 +84,7 @@ fn main() -> Result<(), Error> {
         cost(
             &registry,
             ID,
-            &[(Term::Objects, 2.0), (Term::Product(Product::ONE.pairs(1)), 1.0), (Term::Moved, 1000.0)],
+            &[(Term::Objects, 2.0), (Term::Product(Product { pairs: 1, ..Product::ONE }), 1.0), (Term::Moved, 1000.0)],
         ),
     ]);
     let mut adaptive = Adaptive::new(tuning, &registry)?;

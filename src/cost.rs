@@ -297,7 +297,7 @@ mod tests {
             assert_eq!(curve(1.0).with_residual(residual(wrong)).defect(), Some(CurveError::Residual), "{wrong:?}");
         }
         assert_eq!(curve(1.0).with_helpers(Helpers::new(1)).defect(), Some(CurveError::Helpers));
-        let powers = CostCurve::new(vec![CostTerm::new(Term::Product(Product::ONE.pairs(9)), 1.0)]);
+        let powers = CostCurve::new(vec![CostTerm::new(Term::Product(Product { pairs: 9, ..Product::ONE }), 1.0)]);
         assert!(matches!(powers.defect(), Some(CurveError::Powers { .. })));
         assert!(curve(-1.0).defect().is_some() && curve(f64::NAN).defect().is_some() && curve(0.0).defect().is_some());
     }

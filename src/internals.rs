@@ -5,7 +5,7 @@ pub use crate::broad_phase::check_count;
 pub use crate::cost::{Fallback, Helpers, MOST_UNIT_NS, Places, Residual, Work};
 #[cfg(feature = "parallel")]
 pub use crate::cpu::pinned_pool;
-pub use crate::cpu::{Near, Threads, Tree, Workers};
+pub use crate::cpu::{Threads, Tree, Workers};
 pub use crate::gpu_identity::{GpuIdentity, GpuKind};
 pub use crate::load::{SampledBoxes, SceneStats, StripGrid};
 pub use crate::pair::Pair;

@@ -7,6 +7,7 @@ mod scene_stats;
 mod strip_grid;
 
 use crate::aabb::Aabb;
+use crate::splitmix::mix;
 
 pub(crate) use displacement::is_same_pace;
 pub use displacement::{Displacement, Motion};
@@ -137,6 +138,13 @@ impl Load {
         let strip_candidates = (self.strip_candidates * growth).min(axis_candidates);
         Self { objects, axis_candidates, strip_candidates, pairs, ..*self }
     }
+}
+
+/// Returns one position of each of `parts` equal parts of `0..count`, at a random place: boxes of a kind may follow each
+/// other at regular distances, and an even spacing could meet all or none of them.
+fn one_of_each(count: usize, parts: usize, seed: u64) -> impl Iterator<Item = usize> {
+    let start = move |k: usize| (k as u64 * count as u64 / parts as u64) as usize;
+    (0..parts).map(move |k| start(k) + (mix(seed ^ k as u64) % (start(k + 1) - start(k)) as u64) as usize)
 }
 
 /// Estimates the share of all pairs that overlap on the sweep axis and share a strip.

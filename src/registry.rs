@@ -200,7 +200,9 @@ impl Registry {
     /// ```
     #[cfg(feature = "parallel")]
     pub fn use_pool(&mut self, pool: Arc<rayon::ThreadPool>) {
+        let untimed = self.threads.untimed;
         self.threads = Threads::of(pool);
+        self.threads.untimed = untimed;
         let most = self.threads.most().unwrap_or(1);
         for method in cpu::METHODS {
             let wider =

@@ -196,7 +196,7 @@ impl Space {
     /// Sets the most pairs of active bodies that an update may find, or lifts that limit, as
     /// [`Pairs::set_limit`](crate::Pairs::set_limit) does. Pairs with resting bodies do not count.
     pub fn set_limit(&mut self, limit: Option<usize>) {
-        self.active.search().1.set_limit(limit);
+        self.active.pairs.set_limit(limit);
     }
 
     /// Returns the number of bodies.

@@ -30,8 +30,8 @@ fn terms() -> [(Term, Scale); 4] {
     [
         (Term::Call, Scale::Cycle),
         (Term::Objects, Scale::Cycle),
-        (Term::Product(Product::ONE.objects(1).log2_objects(1)), Scale::Cycle),
-        (Term::Product(Product::ONE.pairs(1).log2_objects(1)), Scale::Cycle),
+        (Term::Product(Product { objects: 1, log2_objects: 1, ..Product::ONE }), Scale::Cycle),
+        (Term::Product(Product { pairs: 1, log2_objects: 1, ..Product::ONE }), Scale::Cycle),
     ]
 }
 

@@ -32,14 +32,13 @@ pub enum Term {
     Product(Product),
 }
 
-/// A product of powers of a load's values, for algorithms that the other terms do not describe: for a tree
-/// `Product::ONE.objects(1).log2_objects(1)` and `Product::ONE.pairs(1).log2_objects(1)`.
+/// A product of powers of a load's values, for algorithms that the other terms do not describe. A tree has two:
+/// `Product { objects: 1, log2_objects: 1, ..Product::ONE }`, and the same with `pairs` in place of `objects`.
 ///
 /// No power is negative, so that no count falls when a value rises. Together they are at most [`Product::MOST_POWERS`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
-#[non_exhaustive]
 pub struct Product {
     /// Power of the number of objects, n.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_zero"))]
@@ -68,42 +67,6 @@ impl Product {
 
     /// Most powers of a product together: more of 2^64 candidates each would overflow to infinity.
     pub const MOST_POWERS: u32 = 8;
-
-    /// Sets the power of the number of objects.
-    #[must_use]
-    pub const fn objects(self, power: u8) -> Self {
-        Self { objects: power, ..self }
-    }
-
-    /// Sets the power of the base-2 logarithm of the number of objects.
-    #[must_use]
-    pub const fn log2_objects(self, power: u8) -> Self {
-        Self { log2_objects: power, ..self }
-    }
-
-    /// Sets the power of the number of pairs.
-    #[must_use]
-    pub const fn pairs(self, power: u8) -> Self {
-        Self { pairs: power, ..self }
-    }
-
-    /// Sets the power of the candidates on the sweep axis.
-    #[must_use]
-    pub const fn axis_candidates(self, power: u8) -> Self {
-        Self { axis_candidates: power, ..self }
-    }
-
-    /// Sets the power of the candidates within a strip.
-    #[must_use]
-    pub const fn strip_candidates(self, power: u8) -> Self {
-        Self { strip_candidates: power, ..self }
-    }
-
-    /// Sets the power of how far boxes move.
-    #[must_use]
-    pub const fn moved(self, power: u8) -> Self {
-        Self { moved: power, ..self }
-    }
 
     /// Whether its powers together are at most [`Self::MOST_POWERS`].
     pub(super) fn is_sound(&self) -> bool {
@@ -200,14 +163,13 @@ mod tests {
         let load = Load::of_objects(8).with_pairs(5.0).with_candidates(3.0, 2.0).with_moved(0.5);
         let count = |product: Product| Term::Product(product).count(&load, 0.0);
         assert_eq!(count(Product::ONE), 1.0);
-        assert_eq!(count(Product::ONE.objects(1).log2_objects(1)), Term::Sort.count(&load, 0.0));
-        assert_eq!(count(Product::ONE.pairs(1).log2_objects(2)), 5.0 * 9.0);
-        assert_eq!(
-            count(Product::ONE.objects(2).axis_candidates(1).strip_candidates(1).moved(1)),
-            64.0 * 3.0 * 2.0 * 0.5
-        );
+        assert_eq!(count(Product { objects: 1, log2_objects: 1, ..Product::ONE }), Term::Sort.count(&load, 0.0));
+        assert_eq!(count(Product { pairs: 1, log2_objects: 2, ..Product::ONE }), 5.0 * 9.0);
+        let all = Product { objects: 2, axis_candidates: 1, strip_candidates: 1, moved: 1, ..Product::ONE };
+        assert_eq!(count(all), 64.0 * 3.0 * 2.0 * 0.5);
         let nothing = Load::default();
-        assert_eq!(Term::Product(Product::ONE.objects(1).log2_objects(1)).count(&nothing, 0.0), 0.0);
-        assert!(Product::ONE.pairs(8).is_sound() && !Product::ONE.pairs(8).moved(1).is_sound());
+        assert_eq!(Term::Product(Product { objects: 1, log2_objects: 1, ..Product::ONE }).count(&nothing, 0.0), 0.0);
+        let most = Product { pairs: 8, ..Product::ONE };
+        assert!(most.is_sound() && !Product { moved: 1, ..most }.is_sound());
     }
 }

@@ -32,8 +32,8 @@ pub use level::{SimdLevel, SimdLevelError};
 pub(crate) use outputs::Outputs;
 pub(crate) use pair_cache::GrownTree;
 pub use threads::Threads;
-pub(crate) use tree::Members;
-pub use tree::{Near, Tree};
+pub use tree::Tree;
+pub(crate) use tree::{Members, Near};
 pub use workers::Workers;
 pub(crate) use world::WorldSearch;
 

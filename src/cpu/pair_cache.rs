@@ -28,7 +28,7 @@ use crate::error::Error;
 use crate::load::{FramePlan, SceneStats};
 use crate::pairs::Pairs;
 use grown::{Grown, Margin, Share};
-use motion::{Advice, Motion, Work};
+use motion::{Motion, Work};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 pub(crate) use tree::GrownTree;
 
@@ -114,8 +114,8 @@ impl BroadPhase for PairCache {
         let started = Instant::now();
         let each = |since: Instant| since.elapsed().as_nanos() as f32 / boxes.len().max(1) as f32;
         let kept = match self.motion.advise(plan, boxes) {
-            Advice::Scratch => Kept::Incomplete,
-            Advice::Keep(margin) => {
+            None => Kept::Incomplete,
+            Some(margin) => {
                 self.upkeep.forget();
                 let kept = self.keep(plan, boxes, margin, pairs, || each(started));
                 if kept != Ok(Kept::Pays) {
@@ -135,9 +135,9 @@ impl BroadPhase for PairCache {
             let Self { workers, tree, upkeep, outputs, .. } = self;
             // Without the time that keeping took in vain.
             let started = Instant::now();
-            upkeep.update(tree.of_boxes(), workers, boxes, || plan.stats(boxes), pairs.screen())?;
+            upkeep.update(&mut tree.tree, workers, boxes, || plan.stats(boxes), pairs.screen())?;
             let searching = Instant::now();
-            outputs.find(workers, pairs, |k, parts, list| tree.self_pairs(k, parts, list));
+            outputs.find(workers, pairs, |k, parts, list| tree.tree.self_pairs(k, parts, list));
             upkeep.searched(searching, boxes.len());
             self.motion.found_from_scratch(boxes.len(), pairs.overlapping(), each(started));
             self.last_frame = FrameKind::FromScratch;
@@ -241,7 +241,7 @@ impl PairCache {
         let again = motion.next_to_shrink(boxes.len());
         let changes = grown.check(workers, boxes, margin, again, pairs.filter(), shares)?;
         // A renewal takes some frames. If the tree has eight places for three boxes before it ends, all is made again.
-        let rebuilt = motion.wants_rebuild(boxes.len(), &changes) || tree.is_sparse(2 * boxes.len());
+        let rebuilt = motion.wants_rebuild(boxes.len(), &changes) || tree.tree.is_sparse(2 * boxes.len());
         *last_frame = if rebuilt { FrameKind::Rebuilt } else { FrameKind::Updated };
         if rebuilt {
             grown.grow_all(workers, boxes, motion.renew(plan, boxes, &changes), shares);
@@ -252,7 +252,7 @@ impl PairCache {
                 list.clear();
                 list.set_limit(Some(most));
             }
-            workers.each(kept, |k, list| tree.self_pairs(k, parts, list));
+            workers.each(kept, |k, list| tree.tree.self_pairs(k, parts, list));
             if !kept.iter_mut().all(|list| list.is_complete() && list.reserve_some_more().is_ok()) {
                 return Ok(Kept::Incomplete);
             }
@@ -260,7 +260,7 @@ impl PairCache {
             changes.gone.clone().for_each(|id| tree.remove(id as u32));
             let far = shares.iter().flat_map(|s| s.far.iter().copied());
             let far = (far, changes.new.start);
-            let wanted = motion.wants_renewal(boxes.len()) || tree.is_sparse(boxes.len());
+            let wanted = motion.wants_renewal(boxes.len()) || tree.tree.is_sparse(boxes.len());
             if tree.update(workers, grown.as_slice(), far, pairs.screen(), wanted)? {
                 motion.renewed();
             }
@@ -452,8 +452,8 @@ mod tests {
                 let expected = double_loop(&boxes, |_| true);
                 assert_eq!(pairs.fingerprint(), expected.fingerprint(), "{simd:?}, frame {frame}");
                 kept += u32::from(method.last_frame().kind == Updated);
-                renewals += u32::from(method.last_frame().kind == Updated && method.tree.places() < places);
-                places = method.tree.places();
+                renewals += u32::from(method.last_frame().kind == Updated && method.tree.tree.places() < places);
+                places = method.tree.tree.places();
             }
             assert!(renewals > 1 && kept > 130, "{renewals} renewals, {kept} frames with kept pairs");
         }

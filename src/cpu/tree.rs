@@ -31,7 +31,7 @@ use order::Order;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use sweeps::{Kind, Sweeps};
 
-pub use queries::Near;
+pub(crate) use queries::Near;
 pub(crate) use upkeep::Upkeep;
 
 /// The id of an empty lane. No box has it: there are at most this many boxes.

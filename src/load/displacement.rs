@@ -1,7 +1,7 @@
 //! Measures how far boxes move from one frame to the next.
 
+use super::one_of_each;
 use crate::aabb::Aabb;
-use crate::splitmix::mix;
 
 /// Boxes watched. The standard error of their mean displacement is an eighth of the standard deviation over all boxes.
 const WATCHED: usize = 64;
@@ -61,14 +61,8 @@ impl Displacement {
     pub fn watch(&mut self, boxes: &[Aabb]) {
         self.rounds = self.rounds.wrapping_add(1);
         self.watching = boxes.len().min(WATCHED);
-        let start = |part: usize| (part as u64 * boxes.len() as u64 / self.watching as u64) as usize;
-        for (k, watched) in self.watched[..self.watching].iter_mut().enumerate() {
-            // One box of each of 64 equal parts, at a random place: boxes that move may follow each other at regular
-            // distances, and an even spacing could meet all or none of them.
-            let (first, end) = (start(k), start(k + 1));
-            let id = first + (mix(self.rounds << 8 | k as u64) % (end - first) as u64) as usize;
-            *watched = (id as u32, boxes[id]);
-        }
+        let ids = one_of_each(boxes.len(), self.watching, self.rounds << 8);
+        self.watched.iter_mut().zip(ids).for_each(|(watched, id)| *watched = (id as u32, boxes[id]));
     }
 
     /// Returns the motion of the watched boxes since. `None` if no watched box is valid and still there.

@@ -1,5 +1,6 @@
 //! A sample of the boxes of a frame.
 
+use super::one_of_each;
 use crate::aabb::Aabb;
 use crate::splitmix::mix;
 
@@ -35,16 +36,9 @@ impl SampledBoxes {
         // Other boxes in each frame if anything moves, and the same ones for the same frame.
         let [x, y, _] = of(count / 2).min.map(f32::to_bits);
         let seed = mix(u64::from(x) << 32 | u64::from(y));
-        let start = |k: usize| (k as u64 * count as u64 / wanted as u64) as usize;
-        for k in 0..wanted {
-            // One box of each of `wanted` equal parts, at a random place: boxes of a kind may follow each other at
-            // regular distances, and an even spacing could meet all or none of them.
-            let (first, end) = (start(k), start(k + 1));
-            let b = of(first + (mix(seed ^ k as u64) % (end - first) as u64) as usize);
-            if b.defect().is_none() {
-                sample.boxes[sample.count] = *b;
-                sample.count += 1;
-            }
+        for b in one_of_each(count, wanted, seed).map(of).filter(|b| b.defect().is_none()) {
+            sample.boxes[sample.count] = *b;
+            sample.count += 1;
         }
         sample
     }

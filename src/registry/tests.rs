@@ -31,6 +31,15 @@ fn user_adds_and_replaces_algorithms() {
     assert!(registry.create(&id).is_ok());
 }
 
+#[test]
+#[cfg(feature = "parallel")]
+fn clock_stays_ignored_in_a_pool() {
+    let mut registry = Registry::with_cores(1);
+    registry.ignore_clock();
+    registry.use_pool(Arc::new(rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap()));
+    assert!(registry.threads.untimed);
+}
+
 /// Accepts these numbers of threads.
 struct Wide(Vec<u32>);
 

@@ -8,40 +8,17 @@ use crate::pairs::Pairs;
 /// See the module. Body `k` is element `k` of each list.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Active {
-    slots: Vec<u32>,
-    boxes: Vec<Aabb>,
+    pub(super) slots: Vec<u32>,
+    pub(super) boxes: Vec<Aabb>,
     /// The update that set the body last.
-    set_in: Vec<u64>,
+    pub(super) set_in: Vec<u64>,
     /// Pairs of positions. The filter has the memberships, if there ever was one that is not the default.
-    pairs: Pairs,
+    pub(super) pairs: Pairs,
 }
 
 impl Active {
     pub(super) fn len(&self) -> usize {
         self.slots.len()
-    }
-
-    pub(super) fn slots(&self) -> &[u32] {
-        &self.slots
-    }
-
-    pub(super) fn boxes(&self) -> &[Aabb] {
-        &self.boxes
-    }
-
-    /// Returns for each body the update that set it last.
-    pub(super) fn set_in(&self) -> &[u64] {
-        &self.set_in
-    }
-
-    /// Returns the boxes, and the list for their pairs.
-    pub(super) fn search(&mut self) -> (&[Aabb], &mut Pairs) {
-        (&self.boxes, &mut self.pairs)
-    }
-
-    /// Returns the pairs of positions that the last search found.
-    pub(super) fn pairs(&self) -> &Pairs {
-        &self.pairs
     }
 
     pub(super) fn push(&mut self, slot: u32, aabb: Aabb, body: &Body, update: u64) {

@@ -54,7 +54,7 @@ impl Resting {
 
     /// Returns the tree, whose ids are slots; `None` without a body.
     pub(super) fn tree(&self) -> Option<&Tree> {
-        self.is_built.then(|| self.tree.inner())
+        self.is_built.then_some(&self.tree.tree)
     }
 
     pub(super) fn epoch(&self) -> u64 {
@@ -105,7 +105,7 @@ impl Resting {
         self.arrivals.sort_unstable();
         let arrivals = std::mem::take(&mut self.arrivals);
         let is_built = std::mem::take(&mut self.is_built);
-        if many || worn || !is_built || self.tree.is_sparse(self.len) {
+        if many || worn || !is_built || self.tree.tree.is_sparse(self.len) {
             self.members.clear();
             self.members.extend(slots.resting());
             let stats = SceneStats::of_members(boxes, &self.members);
@@ -123,7 +123,7 @@ impl Resting {
 
     /// Calls `found` for each body whose box overlaps these bounds.
     pub(super) fn overlapping(&mut self, bounds: &Aabb, found: impl FnMut(u32)) {
-        let nodes = u64::from(self.tree.inner().overlapping(bounds, found));
+        let nodes = u64::from(self.tree.tree.overlapping(bounds, found));
         let [looked, queries] = self.fresh;
         if queries < FRESH {
             self.fresh = [looked + nodes, queries + 1];

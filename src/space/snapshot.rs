@@ -63,8 +63,8 @@ impl Snapshot {
                 At::Free => return None,
                 At::New => (Stage::New, None),
                 At::Active(at) => {
-                    let idle = space.update - active.set_in()[at as usize];
-                    (Stage::Active(idle.min(IDLE)), Some(active.boxes()[at as usize]))
+                    let idle = space.update - active.set_in[at as usize];
+                    (Stage::Active(idle.min(IDLE)), Some(active.boxes[at as usize]))
                 }
                 At::Resting => (Stage::Resting, Some(known)),
             };

@@ -55,7 +55,7 @@ impl Space {
     /// Lets bodies rest that were not set for some updates, if they are many.
     fn rest(&mut self) {
         let Self { active, slots, update, .. } = self;
-        let idle = |at: usize| active.set_in()[at] + IDLE <= *update && !slots.is_changed(active.slots()[at]);
+        let idle = |at: usize| active.set_in[at] + IDLE <= *update && !slots.is_changed(active.slots[at]);
         let first = (0..active.len()).find(|&at| idle(at));
         let Some(first) = first else { return };
         if !self.rests {
@@ -68,7 +68,7 @@ impl Space {
         let resting: Vec<usize> = (first..active.len()).filter(|&at| idle(at)).collect();
         // The highest first: then what takes the place of one does not rest itself.
         for &at in resting.iter().rev() {
-            let slot = self.active.slots()[at];
+            let slot = self.active.slots[at];
             self.leave_active(at as u32);
             self.slots.set_at(slot, At::Resting);
             self.resting.add(slot);
@@ -166,13 +166,12 @@ impl Space {
     fn find(&mut self) -> Result<(), Error> {
         let Self { search, slots, active, resting, neighbours, keys, sorter, .. } = self;
         resting.update(slots)?;
-        let (boxes, pairs) = active.search();
-        search.find_pairs(boxes, pairs)?;
+        search.find_pairs(&active.boxes, &mut active.pairs)?;
         keys.clear();
-        let of = active.slots();
-        keys.extend(active.pairs().iter().map(|&(a, b)| key(of[a as usize], of[b as usize])));
+        let of = &active.slots;
+        keys.extend(active.pairs.iter().map(|&(a, b)| key(of[a as usize], of[b as usize])));
         if resting.len() > 0 {
-            neighbours.each(resting, slots.boxes(), (of, active.boxes()), |at, other| {
+            neighbours.each(resting, slots.boxes(), (of, &active.boxes), |at, other| {
                 let one = of[at];
                 let meet = slots.at(other) == At::Resting
                     && slots.body(one).membership().wants(slots.body(other).membership());

@@ -89,28 +89,22 @@ impl Space {
         self.all().nearest(point, k)
     }
 
-    /// Returns the trees of all bodies, each with what its ids are: positions of active bodies, or slots.
-    fn trees(&self) -> Result<impl Iterator<Item = (&Tree, Ids)>, Error> {
+    /// Returns the trees of all bodies, each with the slot of each id; `None` if ids are slots.
+    fn trees(&self) -> Result<impl Iterator<Item = (&Tree, Option<&[u32]>)>, Error> {
         let active = match self.tree.get() {
             Some(tree) => tree,
             None => {
-                let tree = Tree::of(self.active.boxes())?;
+                let tree = Tree::of(&self.active.boxes)?;
                 self.tree.get_or_init(|| tree)
             }
         };
-        Ok([Some((active, Ids::Positions)), self.resting.tree().map(|tree| (tree, Ids::Slots))].into_iter().flatten())
+        let resting = self.resting.tree().map(|tree| (tree, None));
+        Ok(std::iter::once((active, Some(&self.active.slots[..]))).chain(resting))
     }
 }
 
 fn check(ray: &Ray) -> Result<(), Error> {
     ray.defect().map_or(Ok(()), |defect| Err(Error::InvalidRay { defect }))
-}
-
-/// What the ids of a tree are.
-#[derive(Debug, Clone, Copy)]
-enum Ids {
-    Positions,
-    Slots,
 }
 
 impl<'a> View<'a> {
@@ -120,12 +114,9 @@ impl<'a> View<'a> {
 
     /// Returns the handle of a body that is wanted and still there.
     #[inline]
-    fn wanted(&self, ids: Ids, id: u32) -> Option<Handle> {
-        let Space { active, slots, .. } = self.space;
-        let slot = match ids {
-            Ids::Positions => active.slots()[id as usize],
-            Ids::Slots => id,
-        };
+    fn wanted(&self, slots_of_ids: Option<&[u32]>, id: u32) -> Option<Handle> {
+        let slots = &self.space.slots;
+        let slot = slots_of_ids.map_or(id, |slots| slots[id as usize]);
         let wanted = slots.is_taken(slot) && self.by.is_none_or(|by| by.wants(slots.body(slot).membership()));
         wanted.then(|| slots.handle(slot))
     }
@@ -236,7 +227,7 @@ impl<'a> View<'a> {
         let mut near: Vec<Near> = Vec::new();
         for (tree, ids) in self.space.trees()? {
             tree.nearest(point, k, f32::INFINITY, |id| self.wanted(ids, id).map(Handle::slot), &mut near);
-            all.extend(near.iter().map(|near| (self.space.slots.handle(near.id), near.distance)));
+            all.extend(near.iter().map(|near| (self.space.slots.handle(near.id), near.distance())));
         }
         all.sort_unstable_by(|(a, one), (b, other)| one.total_cmp(other).then(a.cmp(b)));
         all.truncate(k);

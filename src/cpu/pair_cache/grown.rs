@@ -140,7 +140,7 @@ impl Grown {
     #[inline]
     pub(super) fn meet(&self, tree: &GrownTree, i: u32, mut found: impl FnMut(u32)) -> u32 {
         let (bounds, of_i) = (&self.boxes[i as usize], self.memberships.get(i as usize));
-        tree.overlapping(
+        tree.tree.overlapping_wanted(
             bounds,
             || of_i.copied().unwrap_or_default(),
             |j| {

@@ -59,15 +59,6 @@ pub(super) struct Work {
     pub(super) rebuilt: bool,
 }
 
-/// What the next frame should do.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Advice {
-    /// Find the pairs from scratch.
-    Scratch,
-    /// Keep pairs, with this margin for boxes that get a new grown box.
-    Keep(Margin),
-}
-
 /// Watches how far boxes move, and what keeping costs.
 #[derive(Debug)]
 pub(super) struct Motion {
@@ -156,14 +147,14 @@ impl Motion {
         }
     }
 
-    /// What to do about this frame.
-    pub(super) fn advise(&mut self, plan: &FramePlan, boxes: &[Aabb]) -> Advice {
+    /// Returns the margin for boxes that get a new grown box in this frame; `None` if no pairs are to be kept.
+    pub(super) fn advise(&mut self, plan: &FramePlan, boxes: &[Aabb]) -> Option<Margin> {
         self.told = plan.moved().map(|moved| moved as f32);
         if self.keeping.is_none() {
             self.keeping = self.begin(plan, boxes);
             self.displacement.watch(boxes);
         }
-        self.keeping.map_or(Advice::Scratch, |k| Advice::Keep(k.margin))
+        self.keeping.map(|k| k.margin)
     }
 
     /// Takes note of the pairs of a frame.

@@ -12,9 +12,8 @@ use crate::cpu::sort::sort;
 use crate::cpu::tree::{Members, NOBODY, Tree};
 use crate::cpu::workers::Workers;
 use crate::error::Error;
-use crate::filter::{Membership, Screen};
+use crate::filter::Screen;
 use crate::load::SceneStats;
-use crate::pairs::Pairs;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// Fewest boxes that all threads move in a phase: fewer are moved in less time than a phase takes.
@@ -23,7 +22,8 @@ const SMALLEST_SPLIT: usize = 1024;
 /// See the module.
 #[derive(Debug)]
 pub(crate) struct GrownTree {
-    tree: Tree,
+    /// Also of other boxes than grown ones, while their places are not asked for.
+    pub(crate) tree: Tree,
     /// The place of each box in the tree, which any thread may write.
     place_of: Vec<AtomicU32>,
     /// One bit for each box that is out of the tree, while others are sorted anew.
@@ -98,17 +98,6 @@ impl GrownTree {
         Ok(renewed)
     }
 
-    /// Returns the number of places in use, those of removed boxes included.
-    #[cfg(test)]
-    pub(crate) fn places(&self) -> usize {
-        self.tree.places()
-    }
-
-    /// Returns whether too many lanes are empty for this many boxes.
-    pub(crate) fn is_sparse(&self, boxes: usize) -> bool {
-        self.tree.is_sparse(boxes)
-    }
-
     /// Notes the place of each box.
     fn note_places(&mut self, workers: &Workers, boxes: usize) -> Result<(), Error> {
         ensure(&mut self.place_of, boxes, "boxes in a tree")?;
@@ -120,21 +109,6 @@ impl GrownTree {
             }
         });
         Ok(())
-    }
-
-    /// Returns the tree for the boxes themselves, whose places are not known then.
-    pub(crate) fn of_boxes(&mut self) -> &mut Tree {
-        &mut self.tree
-    }
-
-    /// Returns the tree for queries.
-    pub(crate) fn inner(&self) -> &Tree {
-        &self.tree
-    }
-
-    /// Adds part `k` of `parts` of the pairs of all boxes that were in the tree when it was built.
-    pub(crate) fn self_pairs(&self, k: usize, parts: usize, pairs: &mut Pairs) {
-        self.tree.self_pairs(k, parts, pairs);
     }
 
     /// Removes a box.
@@ -215,12 +189,6 @@ impl GrownTree {
         let [first, end] = [places.start, places.end].map(|at| keys.partition_point(|key| key >> 32 < at as u64));
         keys[first..end].iter().map(|&key| key as u32)
     }
-
-    /// See [`Tree::overlapping_wanted`].
-    #[inline]
-    pub(crate) fn overlapping(&self, bounds: &Aabb, by: impl FnOnce() -> Membership, found: impl FnMut(u32)) -> u32 {
-        self.tree.overlapping_wanted(bounds, by, found)
-    }
 }
 
 #[cfg(test)]
@@ -238,9 +206,8 @@ mod tests {
         let mut anywhere = |_: u32| Aabb::cube([0; 3].map(|_| below(3000) as f32 * 0.01), 0.5);
         let mut boxes: Vec<Aabb> = (0..4000).map(&mut anywhere).collect();
         let (workers, mut tree) = (Workers::one(), GrownTree::new(Simd::Portable));
-        let nodes = |tree: &GrownTree, boxes: &[Aabb]| -> u32 {
-            boxes.iter().map(|b| tree.inner().overlapping(b, |_| {})).sum()
-        };
+        let nodes =
+            |tree: &GrownTree, boxes: &[Aabb]| -> u32 { boxes.iter().map(|b| tree.tree.overlapping(b, |_| {})).sum() };
         tree.build(&workers, &boxes, Members::From(0), &SceneStats::of(&boxes), None).unwrap();
         let new = nodes(&tree, &boxes);
         for frame in 0.. {

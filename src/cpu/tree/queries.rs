@@ -8,37 +8,27 @@ use crate::cpu::kernel::distance::Distance;
 use crate::cpu::kernel::ray::Cast;
 use crate::filter::Membership;
 use crate::ray::Ray;
-use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 /// A box near a point. The nearest is the least; of two at the same distance it is the one with the lower id.
-#[derive(Debug, Clone, Copy)]
-pub struct Near {
-    /// The distance from the point to the box, 0 inside.
-    pub distance: f32,
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Near {
+    /// Of the distance, which is not negative: bits have the order of distances.
+    bits: u32,
     /// The name of the box.
-    pub id: u32,
+    pub(crate) id: u32,
 }
 
-impl Ord for Near {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.distance.total_cmp(&other.distance).then(self.id.cmp(&other.id))
+impl Near {
+    fn new(distance: f32, id: u32) -> Self {
+        Self { bits: distance.to_bits(), id }
+    }
+
+    /// Returns the distance from the point to the box, 0 inside.
+    pub(crate) fn distance(&self) -> f32 {
+        f32::from_bits(self.bits)
     }
 }
-
-impl PartialOrd for Near {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Near {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other).is_eq()
-    }
-}
-
-impl Eq for Near {}
 
 impl Tree {
     /// Calls `found` for every box that overlaps these bounds. Returns the number of visited nodes.
@@ -90,7 +80,7 @@ impl Tree {
     /// Distances are rounded: the root of the sum of squares in `f32`. Allocates only if `nearest` has no capacity for
     /// `k` boxes.
     #[inline]
-    pub fn nearest(
+    pub(crate) fn nearest(
         &self,
         point: [f32; 3],
         k: usize,
@@ -106,15 +96,15 @@ impl Tree {
         let mut heap = BinaryHeap::from(std::mem::take(nearest));
         self.walk().nearest_first(self.simd, Distance(point), max_distance, |place, distance| {
             if heap.len() < k {
-                heap.extend(name(self.ids[place]).map(|id| Near { distance, id }));
+                heap.extend(name(self.ids[place]).map(|id| Near::new(distance, id)));
             } else if let Some(mut farthest) = heap.peek_mut()
-                && distance <= farthest.distance
-                && let Some(near) = name(self.ids[place]).map(|id| Near { distance, id })
+                && distance <= farthest.distance()
+                && let Some(near) = name(self.ids[place]).map(|id| Near::new(distance, id))
                 && near < *farthest
             {
                 *farthest = near;
             }
-            if heap.len() < k { max_distance } else { heap.peek().map_or(max_distance, |farthest| farthest.distance) }
+            if heap.len() < k { max_distance } else { heap.peek().map_or(max_distance, Near::distance) }
         });
         *nearest = heap.into_sorted_vec();
     }

@@ -83,7 +83,7 @@ fn unknown_parameters_are_kept() {
 
 #[test]
 fn a_term_is_a_word_or_a_product_of_powers() {
-    let product = Term::Product(Product::ONE.objects(1).log2_objects(2));
+    let product = Term::Product(Product { objects: 1, log2_objects: 2, ..Product::ONE });
     for (term, text) in [
         (Term::ColdObjects, r#""cold_objects""#),
         (product, r#"{"product":{"objects":1,"log2_objects":2}}"#),

@@ -205,8 +205,8 @@ fn nearest_are_those_of_the_sorted_list() {
             let max = if k % 4 == 0 { random.below(8) as f32 } else { INF };
             let mut expected: Vec<Near> = (0..)
                 .zip(boxes)
-                .filter_map(|(id, b)| Some(Near { distance: distance(b.as_ref()?), id: name(id)? }))
-                .filter(|near| near.distance <= max)
+                .filter_map(|(id, b)| Some(Near::new(distance(b.as_ref()?), name(id)?)))
+                .filter(|near| near.distance() <= max)
                 .collect();
             expected.sort_unstable();
             for count in [0, 1, 7, 100, 10_000] {
