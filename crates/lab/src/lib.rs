@@ -49,8 +49,8 @@ pub use report::Report;
 pub use schemas::schemas;
 pub use train::{Trained, train, without};
 pub use training::{
-    Coverage, Floor, MethodScore, Regrets, Split, StoredModel, Training, TrainingCount, TrainingReport, Validation,
-    read_model, write_model,
+    Coverage, Floor, MethodScore, Regrets, Split, StoredModel, Training, TrainingReport, Validation, read_model,
+    write_model,
 };
 
 /// The example of the guide for researchers as a test.

@@ -116,10 +116,6 @@ fn trained_on(training: &Training) -> String {
     rows.extend(
         hosts.iter().map(|((host, label), reports)| vec![(*host).to_owned(), reports.to_string(), (*label).to_owned()]),
     );
-    for counted in &training.trained_on_counts {
-        let hosts = count(counted.physical_machines, "host");
-        rows.push(vec![hosts, counted.reports.to_string(), kind(counted.label).to_owned()]);
-    }
     format!("\n## Trained on\n\n{}", markdown(&rows))
 }
 

@@ -4,15 +4,9 @@ use crate::data::{Profile, Selection};
 use crate::evaluate::{HeldOut, Partition, validate};
 use crate::fit::{Designs, model};
 use crate::progress::Progress;
-use crate::report::Label;
-use crate::training::{Training, TrainingCount, TrainingReport};
+use crate::training::{Training, TrainingReport};
 use anyhow::{Result, bail};
 use sapwise_tune::Model;
-use std::collections::{BTreeMap, BTreeSet};
-
-/// Most reports that a training lists; it counts more. One takes 130 bytes, and the built-in model is part of the
-/// library.
-const MOST_LISTED: usize = 400;
 
 /// A model and how well it did.
 #[derive(Debug, Clone)]
@@ -63,30 +57,9 @@ pub fn train(selection: Selection, name: &str, progress: &dyn Progress) -> Resul
     let validated = validate(&profiles, &designs, &Partition::new(&profiles), progress)?;
     notes.extend(validated.notes.into_iter().filter(|note| !notes.contains(note)).collect::<Vec<_>>());
     let model = model.with_intervals(validated.validation.coverage.map(|c| c.ratios_90_ln));
-    let training = Training { validation: validated.validation, ..behind(&profiles) };
+    let report = |p: &Profile| TrainingReport { file: p.file.clone(), host: p.machine().to_owned(), label: p.label };
+    let training = Training { trained_on: profiles.iter().map(report).collect(), validation: validated.validation };
     Ok(Trained { model, training, notes, held_out: validated.held_out })
-}
-
-/// Lists or counts the reports behind a training, without its validation.
-fn behind(profiles: &[Profile]) -> Training {
-    if profiles.len() <= MOST_LISTED {
-        let report =
-            |p: &Profile| TrainingReport { file: p.file.clone(), host: p.machine().to_owned(), label: p.label };
-        return Training { trained_on: profiles.iter().map(report).collect(), ..Training::default() };
-    }
-    // Labels have no order, their names do.
-    let mut kinds: BTreeMap<String, (Label, usize, BTreeSet<&str>)> = BTreeMap::new();
-    for profile in profiles {
-        let kind = kinds.entry(format!("{:?}", profile.label)).or_insert((profile.label, 0, BTreeSet::new()));
-        kind.1 += 1;
-        kind.2.insert(profile.machine());
-    }
-    let count = |(label, reports, machines): (Label, usize, BTreeSet<&str>)| TrainingCount {
-        label,
-        reports,
-        physical_machines: machines.len(),
-    };
-    Training { trained_on_counts: kinds.into_values().map(count).collect(), ..Training::default() }
 }
 
 #[cfg(test)]
@@ -142,23 +115,6 @@ mod tests {
         let trained = train(of(&reports()[..1]), "test", &Silent).unwrap();
         assert_eq!(trained.model.methods.len(), truth().len());
         assert!(trained.training.validation.methods.is_empty());
-    }
-
-    #[test]
-    fn of_too_many_reports_the_counts_are_kept() {
-        let one = reports().remove(0);
-        let mut profiles = vec![Profile::of("a.json", &one.1); 401];
-        profiles.iter_mut().enumerate().for_each(|(k, p)| {
-            p.file = format!("{k}.json");
-            p.host = format!("{:016x}", k / 2);
-        });
-        profiles[1].label = Label::RealRestricted;
-        let many = behind(&profiles);
-        let counts: Vec<_> = many.trained_on_counts.iter().map(|c| (c.label, c.reports, c.physical_machines)).collect();
-        assert_eq!(counts, [(Label::RealFull, 400, 201), (Label::RealRestricted, 1, 1)]);
-        assert!(many.trained_on.is_empty() && many.reports() == 401);
-        let few = behind(&profiles[1..]);
-        assert!(few.trained_on.len() == 400 && few.trained_on_counts.is_empty() && few.physical_machines() == 201);
     }
 
     #[test]

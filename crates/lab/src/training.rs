@@ -5,18 +5,14 @@ use sapwise_tune::Model;
 use sapwise_tune::json::{self, Format};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
 
 /// The key `training` in the file of a model. Predictions don't need it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Training {
-    /// The reports behind the model. Empty when they are too many.
+    /// The reports behind the model.
     pub trained_on: Vec<TrainingReport>,
-    /// Their numbers by label when they are too many to be listed.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub trained_on_counts: Vec<TrainingCount>,
     /// How well each strategy did on what was held out.
     pub validation: Validation,
 }
@@ -33,24 +29,12 @@ pub struct TrainingReport {
     pub label: Label,
 }
 
-/// How many reports of one label are behind a model.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[schemars(deny_unknown_fields)]
-pub struct TrainingCount {
-    /// What kind of evidence they are.
-    pub label: Label,
-    /// Reports.
-    pub reports: usize,
-    /// Physical machines.
-    pub physical_machines: usize,
-}
-
 /// How well strategies did on machines, or profiles, that were held out of the training.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub struct Validation {
-    /// What was held out in turn: `physical machine`, or `one of 10 groups of physical machines`. With one physical
-    /// machine only it is `SIMD level and thread count`, or `profile`, which says little about other machines.
+    /// What was held out in turn: `physical machine`. With one physical machine only it is `SIMD level and thread
+    /// count`, or `profile`, which says little about other machines.
     pub held_out: String,
     /// Physical machines in the data.
     pub physical_machines: usize,
@@ -178,36 +162,6 @@ pub struct StoredModel {
     pub model: Model,
     /// How it was trained and validated.
     pub training: Training,
-}
-
-impl Training {
-    /// Returns how many reports are behind the model.
-    #[must_use]
-    pub fn reports(&self) -> usize {
-        self.trained_on.len() + self.trained_on_counts.iter().map(|c| c.reports).sum::<usize>()
-    }
-
-    /// Returns how many physical machines these reports are of. If only counts are kept, a machine counts once for
-    /// each label.
-    #[must_use]
-    pub fn physical_machines(&self) -> usize {
-        let listed: BTreeSet<&str> = self.trained_on.iter().map(|r| r.host.as_str()).collect();
-        listed.len() + self.trained_on_counts.iter().map(|c| c.physical_machines).sum::<usize>()
-    }
-
-    /// Returns how many reports of each label are behind the model.
-    #[must_use]
-    pub fn labels(&self) -> Vec<(Label, usize)> {
-        let mut labels: Vec<(Label, usize)> = Vec::new();
-        let listed = self.trained_on.iter().map(|r| (r.label, 1));
-        for (label, count) in listed.chain(self.trained_on_counts.iter().map(|c| (c.label, c.reports))) {
-            match labels.iter_mut().find(|l| l.0 == label) {
-                Some(known) => known.1 += count,
-                None => labels.push((label, count)),
-            }
-        }
-        labels
-    }
 }
 
 /// The training in the file of a model, whose other keys are the model's.

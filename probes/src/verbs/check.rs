@@ -11,7 +11,6 @@ use sapwise_lab::data::report_files;
 use sapwise_lab::kinds::{Agreement, Kind, Times};
 use sapwise_lab::text::count;
 use serde::Serialize;
-use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// Times over those of repeats above which a report is not like them. Undisturbed repeats differ by 2 %, a program that
@@ -44,7 +43,7 @@ struct Repeat {
 
 pub(crate) fn run(arguments: &Check, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
     let here = Here::new(algorithms);
-    let paths = files(&arguments.files)?;
+    let paths = report_files(&arguments.files)?;
     let progress = Progress::new(paths.len() as u64);
     progress.message("reading");
     let look_at = |path: &PathBuf| {
@@ -62,18 +61,6 @@ pub(crate) fn run(arguments: &Check, algorithms: &Algorithms) -> anyhow::Result<
         output::print(&(text(&files, &kinds, Terminal::of_standard_output()) + &next_step(&files, &arguments.files)))?;
     }
     Ok(if failed { Outcome::Failed } else { Outcome::Done })
-}
-
-/// The files, and those of folders. A path that can't be read stays, so that its finding says why.
-fn files(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
-    let mut files: Vec<PathBuf> = Vec::new();
-    for path in paths {
-        files.extend(if path.is_dir() { report_files(std::slice::from_ref(path))? } else { vec![path.clone()] });
-    }
-    // A file that is given twice would agree with itself.
-    let mut seen = BTreeSet::new();
-    files.retain(|file| seen.insert(file.canonicalize().unwrap_or_else(|_| file.clone())));
-    Ok(files)
 }
 
 /// Sorts reports into kinds and compares each with the others of its kind. One that is slower than they are becomes

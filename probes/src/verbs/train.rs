@@ -6,16 +6,13 @@ use crate::exit::{Outcome, WrongUsage};
 use crate::progress::Progress;
 use crate::terminal::Terminal;
 use crate::{interrupt, output, outputs, shell};
-use rayon::prelude::*;
-use sapwise_lab::data::{Selection, read_report, report_files};
+use sapwise_lab::data::{Selection, read_reports, report_files};
+use sapwise_lab::text::count;
 use sapwise_lab::write::write_text;
 use sapwise_lab::{Trained, Training, Validation, model_card, train, write_model};
 use sapwise_tune::Model;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
-
-/// Reports in memory at the same time. A full one takes some megabytes.
-const AT_A_TIME: usize = 64;
+use std::path::Path;
 
 /// The answer for machines.
 #[derive(Serialize)]
@@ -28,15 +25,18 @@ struct Answer<'a> {
 
 pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     let name = name(arguments)?;
-    let reports = report_files(&arguments.reports)?;
+    let files = report_files(&arguments.reports)?;
     let outputs: Vec<_> = [Some(&arguments.out), arguments.card.as_ref()].into_iter().flatten().collect();
-    outputs::check(&reports, &outputs)?;
+    outputs::check(&files, &outputs)?;
     interrupt::listen()?;
-    let progress = Progress::new(reports.len() as u64);
-    let (selection, doubtful) = select(&reports, &progress)?;
-    let Trained { model, training, mut notes, .. } = train(selection, &name, &progress)?;
+    let progress = Progress::new(0);
+    let reports = read_reports(&files, &progress)?;
+    let Trained { model, training, mut notes, .. } = train(Selection::of(&reports), &name, &progress)?;
     drop(progress);
-    notes.extend(doubtful.notes(&arguments.reports));
+    let doubtful = reports.iter().filter(|(_, report)| !doubts(report).is_empty()).count();
+    if doubtful > 0 {
+        notes.push(format!("{doubtful} of {} are doubtful; `sapwise check` says why", count(reports.len(), "report")));
+    }
     write_text(&arguments.out, &write_model(&model, &training)?)?;
     if let Some(path) = &arguments.card {
         write_text(path, &model_card::page(&model, &training, &notes))?;
@@ -48,50 +48,6 @@ pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
         output::print(&summary(&model, &training, &notes, &arguments.out, terminal))?;
     }
     Ok(Outcome::Done)
-}
-
-/// Doubtful reports.
-#[derive(Default)]
-struct Doubtful(Vec<(PathBuf, Vec<String>)>);
-
-impl Doubtful {
-    /// Returns all doubts about reports that the user named, and the number of doubtful reports in folders.
-    fn notes(&self, named: &[PathBuf]) -> Vec<String> {
-        let (own, in_folders): (Vec<_>, Vec<_>) = self.0.iter().partition(|(path, _)| named.contains(path));
-        let of = |(path, doubts): &(PathBuf, Vec<String>)| {
-            let path = path.display().to_string();
-            doubts.iter().map(move |doubt| format!("{path} is doubtful: {doubt}")).collect::<Vec<_>>()
-        };
-        let mut notes: Vec<String> = own.into_iter().flat_map(of).collect();
-        if !in_folders.is_empty() {
-            let (number, what) = (in_folders.len(), if in_folders.len() == 1 { "report is" } else { "reports are" });
-            notes.push(format!("{number} {what} doubtful among those in folders; `sapwise check` says why"));
-        }
-        notes
-    }
-}
-
-/// Reads the reports on all cores, some at a time, and keeps what is trained on.
-fn select(files: &[PathBuf], progress: &Progress) -> anyhow::Result<(Selection, Doubtful)> {
-    progress.message("reading");
-    let mut selection = Selection::default();
-    let mut doubtful = Doubtful::default();
-    for some in files.chunks(AT_A_TIME) {
-        interrupt::check()?;
-        let read = |file: &PathBuf| {
-            let (name, report) = read_report(file, &|text| progress.warn(text))?;
-            Ok((doubts(&report), Selection::reduce(&name, &report)))
-        };
-        let reduced: Vec<_> = some.par_iter().map(read).collect::<anyhow::Result<_>>()?;
-        for (file, (doubts, reduced)) in some.iter().zip(reduced) {
-            if reduced.is_ok() && !doubts.is_empty() {
-                doubtful.0.push((file.clone(), doubts));
-            }
-            selection.add(reduced);
-        }
-        progress.advance(some.len() as u64);
-    }
-    Ok((selection, doubtful))
 }
 
 /// Returns the name that the user gave, or that of the file.

@@ -83,15 +83,9 @@ fn without_indices(place: &str) -> String {
 /// Reads the reports in files and folders on all cores, with the name of each as [`read_report`] gives it.
 ///
 /// # Errors
-/// As [`report_files`] and [`read_report`]; when a file is given twice, which would count as two measurements; when
-/// the user asked to stop.
+/// As [`report_files`] and [`read_report`]; when the user asked to stop.
 pub fn read_reports(paths: &[PathBuf], progress: &dyn Progress) -> anyhow::Result<Vec<(String, Report)>> {
     let files = report_files(paths)?;
-    let mut seen = BTreeSet::new();
-    // What can't be found is an error where it is read.
-    if let Some(file) = files.iter().find(|file| file.canonicalize().is_ok_and(|place| !seen.insert(place))) {
-        bail!("{} is given twice; name each file once", file.display());
-    }
     progress.start(files.len() as u64);
     progress.message("reading");
     let read = |file: &PathBuf| {
@@ -103,7 +97,8 @@ pub fn read_reports(paths: &[PathBuf], progress: &dyn Progress) -> anyhow::Resul
     files.par_iter().map(read).collect()
 }
 
-/// Lists files, and the `*.json` files of folders and of the folders within them, in the order of their paths.
+/// Lists files, and the `*.json` files of folders and of the folders within them, in the order of their paths: each
+/// once, because two would count as two measurements. A file that is missing stays in the list.
 ///
 /// # Errors
 /// When a folder can't be read or holds no such file.
@@ -122,6 +117,8 @@ pub fn report_files(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
             files.push(path.clone());
         }
     }
+    let mut seen = BTreeSet::new();
+    files.retain(|file| seen.insert(file.canonicalize().unwrap_or_else(|_| file.clone())));
     Ok(files)
 }
 
@@ -197,6 +194,7 @@ mod tests {
         let found = report_files(&[folder.path().to_owned()]).unwrap();
         let expected = ["a.json", "b/deep/1t.json", "b/full.json"].map(|file| folder.path().join(file));
         assert_eq!(found, expected);
+        assert_eq!(report_files(&[folder.path().to_owned(), expected[0].clone()]).unwrap(), expected);
         assert!(report_files(&[folder.path().join("b/none")]).is_ok_and(|files| files.len() == 1));
         std::fs::remove_dir_all(folder.path().join("b/deep")).unwrap();
         std::fs::remove_file(folder.path().join("b/full.json")).unwrap();

@@ -9,4 +9,4 @@ pub(crate) use compared::is_real;
 pub use compared::{COMPARED, COMPARED_OF_GPUS, figure};
 pub use files::{Document, read_document, read_report, read_reports, read_text, report_files};
 pub use profile::{Profile, Spot, host, is_sound, machines, usual_scenario};
-pub use selection::{LeftOut, Selection};
+pub use selection::Selection;

@@ -2,20 +2,13 @@
 
 use super::profile::{FEWEST_SAMPLES, Profile};
 use crate::report::{Label, Report};
+use rayon::prelude::*;
 use sapwise::AlgorithmId;
 use sapwise::algorithm::BackendClass;
 use std::collections::{BTreeMap, HashMap};
 
 /// What shares a revision: a method on one class of processor.
 type Key = (BackendClass, String);
-
-/// Why a report is not trained on.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{file} is left out: it {why}")]
-pub struct LeftOut {
-    file: String,
-    why: String,
-}
 
 /// The reports that can be trained on, added one by one so that none has to stay in memory.
 #[derive(Debug, Clone, Default)]
@@ -30,18 +23,18 @@ impl Selection {
     /// Selects from these reports.
     pub fn of(reports: &[(String, Report)]) -> Self {
         let mut selection = Self::default();
-        reports.iter().for_each(|(file, report)| selection.add(Self::reduce(file, report)));
+        let reduced: Vec<_> = reports.par_iter().map(|(file, report)| Self::reduce(file, report)).collect();
+        reduced.into_iter().for_each(|reduced| selection.add(reduced));
         selection
     }
 
-    /// Reduces a report to what is trained on. Apart from [`Selection::add`] because several threads can share this
-    /// work.
+    /// Reduces a report to what is trained on.
     ///
     /// # Errors
     /// Why the report is left out.
-    pub fn reduce(file: &str, report: &Report) -> Result<Profile, LeftOut> {
+    pub(crate) fn reduce(file: &str, report: &Report) -> Result<Profile, String> {
         if let Some(why) = refusal(report) {
-            return Err(LeftOut { file: file.to_owned(), why });
+            return Err(format!("{file} is left out: it {why}"));
         }
         let mut profile = Profile::of(file, report);
         // Between two frames on the CPU a software adapter takes its caches and cores: no program has such frames.
@@ -52,10 +45,10 @@ impl Selection {
     }
 
     /// Adds a reduced report. One that holds the same measurement as an earlier one is left out.
-    pub fn add(&mut self, reduced: Result<Profile, LeftOut>) {
+    pub(crate) fn add(&mut self, reduced: Result<Profile, String>) {
         let profile = match reduced {
             Ok(profile) => profile,
-            Err(left_out) => return self.notes.push(left_out.to_string()),
+            Err(left_out) => return self.notes.push(left_out),
         };
         let fingerprint = profile.fingerprint();
         if let Some(twin) = self.known.get(&fingerprint) {
@@ -97,7 +90,7 @@ fn refusal(report: &Report) -> Option<String> {
         return Some(format!("can't be: {why}"));
     } else if report.points.is_empty() {
         "holds no timings; measure again without `--hardware-only`"
-    } else if report.label == Label::RealContended && report.provenance.threads.is_none() {
+    } else if report.label == Label::RealContended {
         // Of two threads one waits for its turn on a core: 4 ms, where alone both take 50 µs. No hardware parameter
         // shows that.
         "was measured while other programs ran on the same cores; measure again when the machine is idle"
@@ -140,7 +133,7 @@ mod tests {
         contended.label = Label::RealContended;
         let clock = megahertz.hardware.parameters.iter_mut().find(|p| p.name == "clock_measured_ghz").unwrap();
         clock.value = clock.value.map(|ghz| ghz * 1000.0);
-        let (profiles, notes) = selected([published, debug, empty, contended.clone(), megahertz, good.clone(), good]);
+        let (profiles, notes) = selected([published, debug, empty, contended, megahertz, good.clone(), good]);
         assert_eq!(profiles.len(), 1);
         let said = [
             "published",
@@ -151,9 +144,6 @@ mod tests {
             "the same measurement",
         ];
         assert!(said.iter().all(|t| notes.iter().any(|n| n.contains(t))) && notes.len() == 6, "{notes:?}");
-        // With cores of its own for each.
-        contended.provenance.threads = Some(1);
-        assert_eq!(selected([contended]).0.len(), 1);
     }
 
     #[test]

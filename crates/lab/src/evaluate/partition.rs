@@ -4,10 +4,6 @@ use crate::data::Profile;
 use sapwise_tune::hardware::ParameterId;
 use std::collections::BTreeMap;
 
-/// Most machines that are held out one by one, and groups that more machines form. Each fold costs a fit of everything.
-const MOST_ALONE: usize = 24;
-const GROUPS: usize = 10;
-
 /// Folds of profiles: each is judged by what was fitted to all others.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Partition {
@@ -23,27 +19,11 @@ impl Partition {
     /// Makes a fold of each physical machine with all its profiles; of one machine alone, of each SIMD level and each
     /// thread count; without such restrictions, of each profile.
     pub fn new(profiles: &[Profile]) -> Self {
-        Self::of_machines(profiles, MOST_ALONE, GROUPS).unwrap_or_else(|| Self::of_restrictions(profiles))
-    }
-
-    /// Holds out up to `most_alone` machines one by one, more in `groups`; `None` with fewer than two machines.
-    pub fn of_machines(profiles: &[Profile], most_alone: usize, groups: usize) -> Option<Self> {
-        let machines = grouped(profiles, |p| p.machine().to_owned());
-        let count = machines.len();
-        if count < 2 {
-            return None;
+        let folds = grouped(profiles, |p| p.machine().to_owned());
+        if folds.len() < 2 {
+            return Self::of_restrictions(profiles);
         }
-        let (folds, held_out) = if count > most_alone {
-            (groups, format!("one of {groups} groups of physical machines"))
-        } else {
-            (count, "physical machine".to_owned())
-        };
-        let mut folds = vec![Vec::new(); folds];
-        let places = folds.len();
-        for (k, machine) in machines.into_iter().enumerate() {
-            folds[k % places].extend(machine);
-        }
-        Some(Self { held_out, by_machine: true, folds })
+        Self { held_out: "physical machine".to_owned(), by_machine: true, folds }
     }
 
     fn of_restrictions(profiles: &[Profile]) -> Self {
@@ -86,9 +66,6 @@ mod tests {
         let partition = Partition::new(&profiles(&machines));
         assert_eq!(partition.folds, [vec![0, 1], vec![2], vec![3], vec![4], vec![5], vec![6]]);
         assert!(partition.by_machine && partition.held_out == "physical machine");
-        let dealt = Partition::of_machines(&profiles(&machines), 4, 4).unwrap();
-        assert_eq!(dealt.folds, [vec![0, 1, 5], vec![2, 6], vec![3], vec![4]]);
-        assert!(dealt.held_out.contains("4 groups"));
     }
 
     #[test]

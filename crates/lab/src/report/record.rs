@@ -190,18 +190,6 @@ impl Timed {
     }
 }
 
-impl std::fmt::Display for Restricted {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Threads => "threads",
-            Self::Simd => "simd",
-            Self::ContendedMemory => "contended_memory",
-            Self::ContendedCache => "contended_cache",
-            Self::GpuThreads => "gpu_threads",
-        })
-    }
-}
-
 impl Report {
     /// Returns whether the measurement was cut short, as the remarks say.
     #[must_use]
