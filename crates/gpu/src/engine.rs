@@ -258,12 +258,10 @@ impl Engine {
         self.upload.ensure(&self.gpu, end as u64)?;
         let mut view = self.upload.writable(&self.gpu, end as u64)?;
         let planned = OnceLock::new();
-        let beside = || {
-            planned.get_or_init(|| plan(self));
-        };
-        copy(boxes, view.slice(BOXES_AT as usize..ids_at), workers, beside);
+        let plan = || *planned.get_or_init(|| plan(self));
+        copy(boxes, view.slice(BOXES_AT as usize..ids_at), workers, || _ = plan());
         view.slice(ids_at..end).copy_from_slice(numbers);
-        let params = planned.into_inner().unwrap_or_else(|| plan(self));
+        let params = plan();
         self.gpu.ends("planning and copying", Place::Host);
         self.prepare(&params, ids.is_some(), None)?;
         let params = Params { piece: u32::from(ids.is_some()), ..params };

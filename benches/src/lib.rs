@@ -1,1 +1,0 @@
-//! Benchmarks and an example only; nothing here is a library.
