@@ -1,0 +1,27 @@
+/** Numbers and names as people read them. */
+
+/** @returns a whole number with thin spaces between thousands */
+export const count = (n) => Math.round(n).toLocaleString("en").replaceAll(",", "\u202f");
+
+/** @returns milliseconds with two significant digits, without the unit */
+export function milliseconds(ms) {
+  if (Number.isNaN(ms)) return "–";
+  if (ms < 0.001) return "< 0.001";
+  return ms < 100 ? ms.toPrecision(2) : count(ms);
+}
+
+/** @returns `bvh@cpu1` as `bvh`, and `bvh@gpu0` as `bvh, GPU` */
+export const label = (algorithm) => algorithm.replace(/@cpu1$/, "").replace(/@cpu(\d+)$/, ", $1 threads")
+  .replace(/@gpu.*$/, ", GPU");
+
+/** @returns why an algorithm was chosen, without its name in front and the counts of the load at the end */
+export const reason = (because) => because.replace(/^\S+, /, "").replaceAll("@cpu1", "").split(";")[0];
+
+/** @returns the values of the colours of the style sheet by their names without dashes, for canvases */
+export function colours(names) {
+  const style = getComputedStyle(document.documentElement);
+  return Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+}
+
+/** @returns the name of the colour of the algorithm with this number */
+export const hue = (index) => `hue-${index % 8}`;

@@ -1,0 +1,87 @@
+import { curves } from "./curves.js";
+import { $, element } from "./panel.js";
+
+/** Widths in CSS pixels: the least of a figure, and between two. */
+const [FIGURE, BETWEEN] = [360, 32];
+
+/** @returns a table of the parameters of the machine that the report holds */
+function hardware({ hardware: { parameters } }) {
+  const row = (cell, ...texts) => element("tr", {}, ...texts.map((text) => element(cell, {}, text)));
+  const rows = parameters.filter(({ value }) => value != null).map(({ name, value, dispersion, how, source }) => {
+    const spread = dispersion ? ` ± ${Math.round(50 * dispersion)} %` : "";
+    return row("td", name.replaceAll("_", " "), `${Number(value.toPrecision(4))}${spread}`, `${how}: ${source}`);
+  });
+  const head = element("thead", {}, row("th", "what, unit last", "value", "how"));
+  return element("table", {}, head, element("tbody", {}, ...rows));
+}
+
+/** The page that measures this browser. */
+export class ProbeView {
+  #algorithms;
+  #worker = null;
+  #report = null;
+
+  constructor(algorithms) {
+    this.#algorithms = algorithms;
+    $("measure").addEventListener("click", () => this.#start());
+    $("stop").addEventListener("click", () => {
+      this.#worker.postMessage("stop");
+      this.#say("Stopping after this step.");
+    });
+    new ResizeObserver(() => this.#draw()).observe($("probe"));
+  }
+
+  #start() {
+    this.#worker = new Worker(new URL("probe-worker.js", import.meta.url), { type: "module" });
+    this.#worker.onmessage = ({ data }) => this.#hear(data);
+    this.#worker.onerror = ({ message }) => this.#hear({ error: message || "its program did not load" });
+    this.#report = null;
+    this.#work(true);
+    this.#say("Starting.");
+  }
+
+  #hear({ progress, report, prediction, over, error }) {
+    if (progress) {
+      $("progress").value = progress.done / progress.of;
+      this.#say(progress.text);
+    }
+    if (report) {
+      this.#report = { text: report, data: JSON.parse(report), prediction };
+      this.#draw();
+    }
+    if (!over && !error) return;
+    this.#worker.terminate();
+    this.#work(false);
+    if (error) return this.#say(`The probe failed: ${error}. Reload the page and measure again.`);
+    URL.revokeObjectURL($("report").href);
+    const { provenance } = this.#report.data;
+    $("report").href = URL.createObjectURL(new Blob([this.#report.text], { type: "application/json" }));
+    $("report").download = `sapwise-${provenance.date}.json`;
+    const whole = $("progress").value >= 1 ? "Measured" : "Stopped; what was measured is in the report";
+    this.#say(`${whole}, in ${Math.round(provenance.seconds)} seconds.`);
+  }
+
+  /** Shows the buttons that fit: while it measures, and afterwards. */
+  #work(measures) {
+    $("measure").hidden = measures;
+    $("stop").hidden = $("progress").hidden = !measures;
+    $("report").hidden = measures || !this.#report;
+    if (measures) $("progress").value = 0;
+  }
+
+  #say(sentence) {
+    $("stage-of-probe").textContent = sentence;
+  }
+
+  #draw() {
+    if (!this.#report || $("probe").hidden) return;
+    const { data, prediction } = this.#report;
+    const room = $("curves").clientWidth + BETWEEN;
+    const width = room / Math.max(1, Math.floor(room / (FIGURE + BETWEEN))) - BETWEEN;
+    const scenes = [...new Set(data.points.map(({ scenario }) => scenario))];
+    const legend = "Solid: measured here. Dashed: what the built-in model predicts from the parameters below.";
+    const figures = scenes.map((scene) => curves(data, prediction, scene, this.#algorithms, width));
+    $("curves").replaceChildren(element("p", {}, legend), ...figures);
+    $("hardware").replaceChildren(element("h3", {}, "What was measured"), hardware(data));
+  }
+}
