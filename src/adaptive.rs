@@ -81,9 +81,10 @@ impl Adaptive {
     /// then stays in use.
     ///
     /// Tuning without cost curves have nothing to correct, and decide by the number of objects always. On
-    /// `wasm32-unknown-unknown`, which has no clock, no frame is timed and nothing is learned.
+    /// `wasm32-unknown-unknown`, which has no clock, no frame is timed and nothing is learned, unless the program gives
+    /// a clock by `sapwise::set_clock`. Frames of less than four ticks of that clock are not learned from.
     pub fn set_learning(&mut self, learns: bool) {
-        self.runner.policy.set_learning(learns && clock::TICKS);
+        self.runner.policy.set_learning(learns && clock::ticks());
     }
 
     /// Whether trials run: now and then another algorithm than the cheapest runs for 2 to 16 frames, to learn what it

@@ -1,28 +1,76 @@
 //! The clock by which frames are timed.
 
+use std::time::Duration;
+
 #[cfg(test)]
-pub(crate) use counted::Instant;
+pub(crate) use counted::{Instant, tick};
+#[cfg(all(not(test), target_family = "wasm", target_os = "unknown"))]
+pub use given::set_clock;
+#[cfg(all(not(test), target_family = "wasm", target_os = "unknown"))]
+pub(crate) use given::{Instant, tick};
 #[cfg(not(any(test, all(target_family = "wasm", target_os = "unknown"))))]
 pub(crate) use std::time::Instant;
 
-/// Whether the clock runs. If not, every time is zero and nothing may be learned from it.
-pub(crate) const TICKS: bool = !cfg!(all(target_family = "wasm", target_os = "unknown"));
+/// A frame is learned from if it takes at least this many ticks: rounding then changes its time by less than frames
+/// differ anyway.
+const FEWEST_TICKS: u32 = 4;
+
+/// The longest tick of a clock by which algorithms compare the times of parts of a frame.
+const FINE: Duration = Duration::from_micros(10);
+
+/// Returns the time between two readings of the clock that differ; `None` if there is no clock.
+#[cfg(not(any(test, all(target_family = "wasm", target_os = "unknown"))))]
+pub(crate) const fn tick() -> Option<Duration> {
+    Some(Duration::ZERO)
+}
+
+/// Returns whether there is a clock. If not, every time is zero.
+pub(crate) fn ticks() -> bool {
+    tick().is_some()
+}
+
+/// Returns whether the clock can time parts of a frame.
+pub(crate) fn is_fine() -> bool {
+    tick().is_some_and(|tick| tick <= FINE)
+}
+
+/// Returns the nanoseconds since then, at least 1; `None` if the clock is too coarse to tell.
+pub(crate) fn measured_ns(since: Instant) -> Option<f64> {
+    let elapsed = since.elapsed();
+    tick().filter(|&tick| elapsed >= FEWEST_TICKS * tick).map(|_| (elapsed.as_nanos() as f64).max(1.0))
+}
 
 /// Replaces the standard library's clock, which traps in WebAssembly without a system. A crate that asks a browser
-/// for its clock needs imports that other hosts lack.
+/// for its clock needs imports that other hosts lack, so the program gives one.
 #[cfg(all(not(test), target_family = "wasm", target_os = "unknown"))]
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Instant;
+mod given {
+    use super::Duration;
+    use std::sync::OnceLock;
 
-#[cfg(all(not(test), target_family = "wasm", target_os = "unknown"))]
-impl Instant {
-    pub(crate) fn now() -> Self {
-        Self
+    static CLOCK: OnceLock<(fn() -> Duration, Duration)> = OnceLock::new();
+
+    /// Gives the library a clock, from which [`Adaptive`](crate::Adaptive) learns: the time since any moment, and the
+    /// least difference of two readings. Call it once, before anything else. Returns `false`, and changes nothing, if
+    /// there is a clock already. Only on `wasm32-unknown-unknown`.
+    pub fn set_clock(now: fn() -> Duration, tick: Duration) -> bool {
+        CLOCK.set((now, tick)).is_ok()
     }
 
-    #[expect(clippy::unused_self, reason = "same signature as in the standard library")]
-    pub(crate) fn elapsed(&self) -> std::time::Duration {
-        std::time::Duration::ZERO
+    #[derive(Debug, Clone, Copy)]
+    pub(crate) struct Instant(Duration);
+
+    impl Instant {
+        pub(crate) fn now() -> Self {
+            Self(CLOCK.get().map_or(Duration::ZERO, |(now, _)| now()))
+        }
+
+        pub(crate) fn elapsed(&self) -> Duration {
+            Self::now().0.saturating_sub(self.0)
+        }
+    }
+
+    pub(crate) fn tick() -> Option<Duration> {
+        CLOCK.get().map(|&(_, tick)| tick)
     }
 }
 
@@ -30,8 +78,8 @@ impl Instant {
 /// [runs](counted::run).
 #[cfg(test)]
 pub(crate) mod counted {
+    use super::Duration;
     use std::cell::Cell;
-    use std::time::Duration;
 
     /// Nanoseconds of a decision, and of comparing boxes with those of the previous frame, while the program uses the
     /// caches. Means of five runs of `sapwise run` on the Zen 5 host of `datasets/`: 11 to 17 µs (34 µs in the
@@ -45,7 +93,19 @@ pub(crate) mod counted {
         5_000.0 + 15_000.0 * (boxes as f64 / 3000.0).min(1.0)
     }
 
-    thread_local!(static NOW: Cell<Option<Duration>> = const { Cell::new(None) });
+    thread_local! {
+        static NOW: Cell<Option<Duration>> = const { Cell::new(None) };
+        static TICK: Cell<Duration> = const { Cell::new(Duration::ZERO) };
+    }
+
+    pub(crate) fn tick() -> Option<Duration> {
+        Some(TICK.get())
+    }
+
+    /// Makes the clock of this thread as coarse as that of a browser.
+    pub(crate) fn set_tick(tick: Duration) {
+        TICK.set(tick);
+    }
 
     #[derive(Debug, Clone, Copy)]
     pub(crate) enum Instant {

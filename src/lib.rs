@@ -82,6 +82,8 @@ pub use algorithm::AlgorithmId;
 pub use between::Between;
 pub use broad_phase::BroadPhase;
 pub use changes::Changes;
+#[cfg(all(not(test), target_family = "wasm", target_os = "unknown"))]
+pub use clock::set_clock;
 pub use error::Error;
 pub use filter::{Filter, Membership};
 pub use pairs::{PairOrder, Pairs};

@@ -419,14 +419,15 @@ impl Policy {
     }
 
     /// Takes in a frame of a candidate that was decided, stood out or belongs to a trial, and adds it to the epoch if
-    /// it shows a usual cost.
-    pub(super) fn ran(&mut self, candidate: usize, ns: f64, work: Option<FrameWork>, epoch: &mut Epoch) {
+    /// it shows a usual cost. `None` for a time that the clock can't tell: it counts as expected, and shows nothing.
+    pub(super) fn ran(&mut self, candidate: usize, ns: Option<f64>, work: Option<FrameWork>, epoch: &mut Epoch) {
         let frame = self.frame + u64::from(epoch.frames);
         let entered = self.ran.replace(candidate) != Some(candidate);
         let remembered = self.remembers(candidate);
         let first_ns = self.first_ns(candidate);
         let c = &self.candidates[candidate];
         let (kept, observed, wait) = (c.kept, c.observed, c.wait);
+        let (timed, ns) = (ns.is_some(), ns.unwrap_or(c.mean_ns));
         let now_ns = self.incumbent.map_or(0.0, |k| self.candidates[k].mean_ns);
         let over_mean = match (self.trials.running, self.incumbent, work) {
             // A rebuild of shared state would have come with the incumbent, too.
@@ -441,7 +442,7 @@ impl Policy {
         if waited_ns > 0.0 {
             self.waits[wait].add(waited_ns.min(MOST_WAIT * most_ns), frame);
         }
-        if !entered || cold || remembered {
+        if timed && (!entered || cold || remembered) {
             epoch.count((ns - waited_ns) / if cold { COLD } else { 1.0 }, work);
         }
     }

@@ -244,8 +244,8 @@ impl Runner {
         let instance = self.running.map(|running| &mut self.instances[running]);
         match instance.and_then(|i| i.go_on(boxes, pairs)).unwrap_or_else(|| Err(self.gone())) {
             Ok(work) => {
-                let ns = started.map(|started| (started.elapsed().as_nanos() as f64).max(1.0));
-                (self.work, self.measured_ns) = (work, ns.filter(|_| clock::TICKS));
+                let ns = started.and_then(clock::measured_ns);
+                (self.work, self.measured_ns) = (work, ns);
                 if self.epoch.add(ns, work) {
                     self.stood_out(ns.unwrap_or_default(), boxes, pairs);
                 } else {
@@ -266,7 +266,7 @@ impl Runner {
     fn stood_out(&mut self, ns: f64, boxes: &[Aabb], pairs: &Pairs) {
         let Some(choice) = self.choice else { return };
         self.tracker.ran(boxes, pairs.len() as u64);
-        self.policy.ran(choice.chosen, ns, self.work, &mut self.epoch);
+        self.policy.ran(choice.chosen, Some(ns), self.work, &mut self.epoch);
         self.tracker.pace.wake();
     }
 
@@ -286,8 +286,8 @@ impl Runner {
             let started = Instant::now();
             match self.instances[instance].run(&candidate.id, frame, self.tracker.plan(), boxes, pairs) {
                 Ok(work) => {
-                    let ns = (started.elapsed().as_nanos() as f64).max(1.0);
-                    (self.work, self.measured_ns) = (work, clock::TICKS.then_some(ns));
+                    let ns = clock::measured_ns(started);
+                    (self.work, self.measured_ns) = (work, ns);
                     if let Some(before) = self.running.replace(instance).filter(|before| *before != instance) {
                         self.instances[before].leave(frame);
                     }
@@ -300,7 +300,7 @@ impl Runner {
     }
 
     /// Takes in a frame that was decided or belongs to a trial.
-    fn ran(&mut self, choice: Choice, ns: f64, boxes: &[Aabb], pairs: &Pairs) {
+    fn ran(&mut self, choice: Choice, ns: Option<f64>, boxes: &[Aabb], pairs: &Pairs) {
         self.tracker.ran(boxes, pairs.len() as u64);
         if self.epoch.frames == 0 {
             self.epoch = self.policy.epoch(choice.chosen);
@@ -311,7 +311,7 @@ impl Runner {
         if began {
             self.tell();
         }
-        self.tracker.pace.set_rest(ns, self.policy.rest());
+        self.tracker.pace.set_rest(ns.or(choice.predicted_ns).unwrap_or(1.0), self.policy.rest());
         // A first frame, and one that replaced another, were chosen by little knowledge.
         if matches!(choice.reason, Reason::First | Reason::FellBack) {
             self.tracker.pace.wake();
@@ -372,6 +372,6 @@ impl Runner {
 
 fn policy(tuning: Tuning, made: &Instances) -> Policy {
     let mut policy = Policy::new(tuning, &made.kept(), &made.usable());
-    policy.set_learning(clock::TICKS);
+    policy.set_learning(clock::ticks());
     policy
 }

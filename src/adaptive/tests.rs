@@ -9,6 +9,7 @@ use crate::scene::{Scenario, Scene};
 use crate::tuning::{AlgorithmCost, CostCurve, CostTerm, Term};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 
 fn tuning(costs: &[(&str, f64, f64)]) -> Tuning {
     tuning_of([Term::Call, Term::Objects], costs)
@@ -128,6 +129,32 @@ impl BroadPhase for Told {
     fn missed_frames(&mut self, frames: u64) {
         self.0.fetch_add(frames, Ordering::Relaxed);
     }
+}
+
+/// Takes this many nanoseconds of the counted clock.
+struct Spends(f64);
+
+impl BroadPhase for Spends {
+    fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        clock::counted::spend(self.0);
+        pairs.clear();
+        pairs.finish()
+    }
+}
+
+#[test]
+fn frames_below_four_ticks_teach_nothing() {
+    let learned = |ns: f64| {
+        let mut registry = Registry::with_cores(1);
+        registry.add("spends@cpu1".parse().unwrap(), 1, move || Ok(Box::new(Spends(ns))));
+        let mut adaptive = Adaptive::new(tuning(&[("spends@cpu1", 2e5, 0.0)]), &registry).unwrap();
+        clock::counted::set_tick(Duration::from_micros(100));
+        clock::counted::run(|| (0..50).for_each(|_| _ = chosen(&mut adaptive, 30)));
+        clock::counted::set_tick(Duration::ZERO);
+        (adaptive.last_decision().unwrap().measured_ns, adaptive.learned() != *adaptive.tuning())
+    };
+    assert_eq!(learned(399_000.0), (None, false));
+    assert_eq!(learned(401_000.0), (Some(401_000.0), true));
 }
 
 #[test]

@@ -52,7 +52,7 @@ impl Threads {
 
     /// Returns whether algorithms decide by measured times.
     pub(crate) fn timed(&self) -> bool {
-        clock::TICKS && !self.untimed
+        clock::is_fine() && !self.untimed
     }
 
     /// Returns the most threads of an algorithm, its caller among them, if the program's pool bounds them.

@@ -50,7 +50,7 @@ const APART: usize = 8;
 /// One decided frame.
 fn ran(policy: &mut Policy, candidate: usize, ns: f64, work: Option<FrameWork>) {
     let mut epoch = policy.epoch(candidate);
-    policy.ran(candidate, ns, work, &mut epoch);
+    policy.ran(candidate, Some(ns), work, &mut epoch);
     epoch.frames += 1;
     policy.observe(candidate, &epoch, work);
 }
@@ -96,7 +96,7 @@ fn run_told(
         let (_, epoch, last) = running.as_mut().unwrap();
         *last = work(choice.chosen, at);
         woken = { *epoch }.add(Some(real_ns), *last);
-        policy.ran(choice.chosen, real_ns, *last, epoch);
+        policy.ran(choice.chosen, Some(real_ns), *last, epoch);
         epoch.frames += 1;
         let predicted_ns = choice.predicted_ns.unwrap();
         let cheapest_ns = choice.runner_up.map_or(predicted_ns, |(_, ns)| ns.min(predicted_ns));
