@@ -1,0 +1,22 @@
+//! Sapwise for browsers and Node.js. What is exported here is JavaScript's: `wasm-bindgen` writes the module and its
+//! TypeScript types from these items and their comments.
+
+mod arrays;
+mod broad_phase;
+mod clock;
+mod fault;
+mod find;
+mod memberships;
+mod probe;
+mod scene;
+mod space;
+mod tuning;
+
+use wasm_bindgen::prelude::*;
+
+/// Runs once the module is loaded.
+#[wasm_bindgen(start)]
+fn start() {
+    fault::install();
+    clock::install();
+}
