@@ -1,4 +1,4 @@
-import { count, hue, label } from "./format.js";
+import { count, hue, label, power } from "./format.js";
 import { element } from "./panel.js";
 
 /** Sizes in CSS pixels: height of the drawing, and room for the axes and for the names of the curves. */
@@ -60,7 +60,9 @@ export function curves(report, prediction, scene, algorithms, width) {
   const lines = byAlgorithm(report.points.filter(of).flatMap(({ load: { objects }, timings }) => timings
     .filter((timing) => timing.samples_ns.length > 0)
     .map((timing) => ({ algorithm: timing.algorithm, objects, ns: median(timing.samples_ns) }))));
-  const predicted = byAlgorithm(prediction.filter(of));
+  const most = Math.max(...[...lines.values()].flat().map(([, ms]) => ms));
+  // What is far above all that was measured would flatten the rest.
+  const predicted = byAlgorithm(prediction.filter((row) => of(row) && row.ns < 4e6 * most));
   const best = fields(lines);
   const words = best.map(({ algorithm, from }, i) => label(algorithm)
     + (i > 0 ? ` from ${count(Number(from.toPrecision(2)))}` : "")).join(", ");
@@ -83,16 +85,18 @@ export function curves(report, prediction, scene, algorithms, width) {
     return paint(algorithm, shapes);
   });
   shapes.push(...decades(left, right).map((decade) => `<text x="${x(10 ** decade)}" y="${floor + 16}"
-    text-anchor="middle">${count(10 ** decade)}</text>`));
+    text-anchor="middle">${power(decade)}</text>`));
   shapes.push(...decades(low, high).map((decade) => [decade, y(10 ** decade)]).map(([decade, at]) => `
     <path class="rule" d="M${LEFT} ${at}h${wide}"/>
-    <text x="${LEFT - 8}" y="${at + 4}" text-anchor="end">${Number((10 ** decade).toPrecision(1))}</text>`));
-  const whole = [...lines.values()].filter((line) => line.at(-1)[0] > 0.9 * 10 ** right);
-  const ends = spread(whole.map((line) => y(line.at(-1)[1])), 15);
-  lines.forEach((line, algorithm) => shapes.push(paint(algorithm, `${path(line, "")}${
+    <text x="${LEFT - 8}" y="${at + 4}" text-anchor="end">${power(decade)}</text>`));
+  // An algorithm that left the sweep has its name at the end of what is predicted.
+  const ends = spread([...lines].map(([algorithm, line]) => {
+    const [objects, ms] = line.at(-1);
+    return y(objects > 0.9 * 10 ** right ? ms : predicted.get(algorithm)?.at(-1)[1] ?? ms);
+  }), 15);
+  [...lines].forEach(([algorithm, line], i) => shapes.push(paint(algorithm, `${path(line, "")}${
     path(predicted.get(algorithm) ?? line, "predicted")}
-    <text class="name" x="${x(line.at(-1)[0]) + 6}" y="${(ends[whole.indexOf(line)] ?? y(line.at(-1)[1])) + 4}">${
-      label(algorithm)}</text>`)));
+    <text class="name" x="${LEFT + wide + 6}" y="${ends[i] + 4}">${label(algorithm)}</text>`)));
   shapes.push(`<text x="0" y="${FIELD}">ms</text>
     <text x="${LEFT + wide / 2}" y="${HEIGHT - 2}" text-anchor="middle">objects</text>`);
   const figure = element("figure", {}, element("h3", {}, scene),

@@ -88,12 +88,11 @@ export class Demo {
     const fixed = new Map();
     for (const [name, contestant] of this.fixed) fixed.set(name, contestant.run(this.boxes));
     this.#encounters.update(this.pairs, this.objects);
-    const { begun, ended } = this.#encounters;
-    const { objects, frame } = this;
+    const [{ begun, ended }, { objects, frame }] = [this.#encounters, this];
     // A trial of some frames is no switch.
     if (algorithm !== this.#incumbent && !because.includes("tried")) {
       if (this.#incumbent) this.switches.unshift({ frame, objects, from: this.#incumbent, to: algorithm, because });
-      this.switches.length = Math.min(this.switches.length, SWITCHES);
+      this.switches.splice(SWITCHES);
       this.#incumbent = algorithm;
     }
     this.history.push({ algorithm, because, ms, objects, pairs: this.pairs.length / 2, begun, ended, fixed });

@@ -10,6 +10,9 @@ export function milliseconds(ms) {
   return ms < 100 ? ms.toPrecision(2) : count(ms);
 }
 
+/** @returns a power of ten, without an exponent */
+export const power = (decade) => decade < 0 ? (10 ** decade).toFixed(-decade) : count(10 ** decade);
+
 /** @returns `bvh@cpu1` as `bvh`, and `bvh@gpu0` as `bvh, GPU` */
 export const label = (algorithm) => algorithm.replace(/@cpu1$/, "").replace(/@cpu(\d+)$/, ", $1 threads")
   .replace(/@gpu.*$/, ", GPU");

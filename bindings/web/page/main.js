@@ -48,19 +48,14 @@ export function run(wanted) {
 const toObjects = (share) => Number((FEWEST * (MOST / FEWEST) ** share).toPrecision(2));
 const toShare = (objects) => Math.log(objects / FEWEST) / Math.log(MOST / FEWEST);
 let wanted;
-/** Shows the number that is wanted. */
-function want(objects) {
-  wanted = Math.min(MOST, Math.max(FEWEST, Math.round(objects)));
-  [$("objects").value, $("wanted").textContent] = [toShare(wanted), count(wanted)];
-  $("objects").ariaValueText = `${wanted} objects`;
-}
 function restart() {
   demo.restart($("scene").value, wanted);
   stage?.reframe();
-  awake = 60;
 }
 function resize(objects) {
-  want(objects);
+  wanted = Math.min(MOST, Math.max(FEWEST, Math.round(objects)));
+  [$("objects").value, $("wanted").textContent] = [toShare(wanted), count(wanted)];
+  $("objects").ariaValueText = `${wanted} objects`;
   restart();
 }
 function step() {
@@ -72,7 +67,7 @@ $("pause").addEventListener("click", () => run(!running));
 $("step").addEventListener("click", step);
 $("restart").addEventListener("click", restart);
 $("scene").addEventListener("change", restart);
-want(FIRST);
+resize(FIRST);
 run(running);
 if (!running) panel.notice(LESS_MOTION);
 
@@ -86,7 +81,7 @@ document.addEventListener("keydown", (event) => {
   const camera = target === $("stage") || !scrolls();
   if (key in actions || camera && hands?.key(key)) event.preventDefault();
 });
-for (const event of ["pointermove", "wheel", "keydown", "resize"]) {
+for (const event of ["pointermove", "wheel", "keydown", "click", "input", "change", "resize", "hashchange"]) {
   addEventListener(event, () => { awake = 60; });
 }
 addEventListener("error", ({ message }) => panel.notice(`${message}. Reload the page.`));
@@ -110,7 +105,6 @@ function show() {
     $(id).hidden = id !== page;
     document.querySelector(`nav a[href="#${id}"]`).ariaCurrent = id === page ? "page" : null;
   }
-  awake = 60;
 }
 addEventListener("hashchange", show);
 show();

@@ -8,7 +8,7 @@ const SCENES = {
   fragmentation: "Explode: cubes shatter",
   "free-fall": "Fall: cubes drop onto a pile",
   gravity: "Swarm: a whirling cloud",
-  uniform: "Rest: spread evenly",
+  uniform: "Even: spread out, drifting",
   clustered: "Crowd: dense clusters",
   mixed: "Mix: small and large",
   teleport: "Jump: all at once, now and then",

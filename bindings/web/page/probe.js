@@ -1,17 +1,24 @@
 import { curves } from "./curves.js";
+import { count } from "./format.js";
 import { $, element } from "./panel.js";
 
 /** Widths in CSS pixels: the least of a figure, and between two. */
-const [FIGURE, BETWEEN] = [360, 32];
+const [FIGURE, BETWEEN] = [330, 32];
+
+/** Units at the end of a parameter's name. */
+const UNITS = { ghz: "GHz", ns: "ns", bytes: "bytes", gb_per_s: "GB/s" };
 
 /** @returns a table of the parameters of the machine that the report holds */
 function hardware({ hardware: { parameters } }) {
   const row = (cell, ...texts) => element("tr", {}, ...texts.map((text) => element(cell, {}, text)));
   const rows = parameters.filter(({ value }) => value != null).map(({ name, value, dispersion, how, source }) => {
+    const [, what, unit] = name.match(/^(.*?)_?(ghz|ns|bytes|gb_per_s)?$/);
+    const number = value < 100 ? Number(value.toPrecision(3)) : count(value);
     const spread = dispersion ? ` ± ${Math.round(50 * dispersion)} %` : "";
-    return row("td", name.replaceAll("_", " "), `${Number(value.toPrecision(4))}${spread}`, `${how}: ${source}`);
+    const words = what.replaceAll("_", " ").replace("kib", "KiB");
+    return row("td", words, `${number} ${UNITS[unit] ?? ""}${spread}`, `${how}: ${source}`);
   });
-  const head = element("thead", {}, row("th", "what, unit last", "value", "how"));
+  const head = element("thead", {}, row("th", "what", "value ± half the spread", "how"));
   return element("table", {}, head, element("tbody", {}, ...rows));
 }
 
@@ -28,7 +35,9 @@ export class ProbeView {
       this.#worker.postMessage("stop");
       this.#say("Stopping after this step.");
     });
-    new ResizeObserver(() => this.#draw()).observe($("probe"));
+    // In the next picture, when the page is laid out.
+    const draw = () => requestAnimationFrame(() => this.#draw());
+    for (const event of ["resize", "hashchange"]) addEventListener(event, draw);
   }
 
   #start() {
@@ -57,8 +66,8 @@ export class ProbeView {
     const { provenance } = this.#report.data;
     $("report").href = URL.createObjectURL(new Blob([this.#report.text], { type: "application/json" }));
     $("report").download = `sapwise-${provenance.date}.json`;
-    const whole = $("progress").value >= 1 ? "Measured" : "Stopped; what was measured is in the report";
-    this.#say(`${whole}, in ${Math.round(provenance.seconds)} seconds.`);
+    const ended = $("progress").value >= 1 ? "Measured" : "Stopped; the report holds what was measured";
+    this.#say(`${ended}, in ${Math.round(provenance.seconds)} seconds.`);
   }
 
   /** Shows the buttons that fit: while it measures, and afterwards. */

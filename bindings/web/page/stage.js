@@ -150,7 +150,7 @@ export class Stage {
     const [right, up, ahead] = [[ca, sa, 0], [-sa * se, ca * se, ce], [-sa * ce, ca * ce, -se]];
     const aspect = this.#canvas.clientWidth / Math.max(1, this.#canvas.clientHeight);
     const scale = [1 / (OPENING * aspect), 1 / OPENING];
-    const distance = 1.02 * this.#radius / (OPENING * Math.min(1, aspect) * this.zoom);
+    const distance = 0.92 * this.#radius / (OPENING * Math.min(1, aspect) * this.zoom);
     return { right, up, ahead, scale, distance, eye: add(this.#centre, ahead, -distance) };
   }
 

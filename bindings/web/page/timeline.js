@@ -1,5 +1,5 @@
 import { SPAN } from "./demo.js";
-import { colours, count, hue, label } from "./format.js";
+import { colours, count, hue, label, power } from "./format.js";
 
 /** Heights in CSS pixels: the band, the captions of the curves, and the curve of the objects. */
 const [BAND, CAPTION, OBJECTS] = [26, 26, 44];
@@ -9,15 +9,16 @@ const LEFT = 52;
 const WINDOW = 31;
 
 /**
- * Averages around each frame over as few frames as the clock can tell apart.
+ * Averages each frame that is too short for the clock with short ones around it.
  * @returns the means; NaN where nothing ran
  */
 export function smooth(values, resolution) {
+  const enough = 8 * resolution;
   return values.map((value, at) => {
     let [sum, frames] = [value, 1];
-    for (let reach = 1; sum < 8 * resolution && frames < WINDOW; reach++) {
+    for (let reach = 1; sum < enough && frames < WINDOW; reach++) {
       for (const neighbour of [values[at - reach], values[at + reach]]) {
-        if (neighbour >= 0) [sum, frames] = [sum + neighbour, frames + 1];
+        if (neighbour < enough) [sum, frames] = [sum + neighbour, frames + 1];
       }
       if (at - reach < 0 && at + reach >= values.length) break;
     }
@@ -33,10 +34,8 @@ export class Timeline {
   #resolution;
 
   constructor(canvas, algorithms, resolution) {
-    this.#canvas = canvas;
+    [this.#canvas, this.#algorithms, this.#resolution] = [canvas, algorithms, resolution];
     this.#context = canvas.getContext("2d");
-    this.#algorithms = algorithms;
-    this.#resolution = resolution;
     this.recolour();
   }
 
@@ -90,7 +89,7 @@ export class Timeline {
     const y = (ms) => bottom - (bottom - top) * (Math.max(Math.log10(ms), low) - low) / (high - low);
     for (let decade = low; decade <= high; decade++) {
       this.#rule(x(0), x(SPAN - 1), y(10 ** decade));
-      this.#text(String(+(10 ** decade).toPrecision(1)), LEFT - 8, y(10 ** decade), "right", "soft");
+      this.#text(power(decade), LEFT - 8, y(10 ** decade), "right", "soft");
     }
     for (const [name, ms] of curves) {
       this.#curve(ms.map((value) => y(value)), x, name ? this.#colour(name) : this.colours.ink, name ? 1.25 : 2);
