@@ -22,6 +22,7 @@ use crate::cpu::columns::{Columns, PADDING};
 use crate::cpu::level::Simd;
 use crate::pair::Pair;
 use crate::pairs::{Pairs, each_bit};
+use baseline::Four;
 use contain::{BLOCK, within};
 use floats::Floats;
 use node::LANES;
@@ -74,27 +75,38 @@ pub(crate) trait Level: Copy {
     }
 }
 
-/// The instructions that every CPU of the target has: SSE2 on x86-64, elsewhere what the compiler makes of plain Rust.
+/// The instructions that every CPU of the target has: SSE2 on x86-64, `simd128` on WebAssembly if the build has it,
+/// elsewhere what the compiler makes of plain Rust.
 #[derive(Clone, Copy)]
 pub(crate) struct Baseline;
 
-#[cfg(target_arch = "x86_64")]
 impl Level for Baseline {
-    type Rows = [std::arch::x86_64::__m128; 2];
-    type Lanes = [std::arch::x86_64::__m128; 4];
+    type Rows = baseline::Rows;
+    type Lanes = baseline::Lanes;
 }
 
-#[cfg(not(target_arch = "x86_64"))]
-impl Level for Baseline {
-    type Rows = [f32; 4];
-    type Lanes = [f32; LANES];
+#[cfg(target_arch = "x86_64")]
+mod baseline {
+    use std::arch::x86_64::__m128;
+    pub(super) type Four = [__m128; 1];
+    pub(super) type Rows = [__m128; 2];
+    pub(super) type Lanes = [__m128; 4];
 }
 
-/// Four floats, at the level of every CPU.
-#[cfg(target_arch = "x86_64")]
-type Four = [std::arch::x86_64::__m128; 1];
-#[cfg(not(target_arch = "x86_64"))]
-type Four = [f32; 4];
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod baseline {
+    use std::arch::wasm32::v128;
+    pub(super) type Four = [v128; 1];
+    pub(super) type Rows = [v128; 2];
+    pub(super) type Lanes = [v128; 4];
+}
+
+#[cfg(not(any(target_arch = "x86_64", all(target_arch = "wasm32", target_feature = "simd128"))))]
+mod baseline {
+    pub(super) type Four = [f32; 4];
+    pub(super) type Rows = [f32; 4];
+    pub(super) type Lanes = [f32; 16];
+}
 
 /// Calls a kernel in a function that enables the instructions of a SIMD level. The kernel is inlined there, and takes
 /// the [`Level`] behind its other arguments. In brackets: generic parameters of the kernel before that of the level,

@@ -11,8 +11,8 @@ named! {
     #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
     #[non_exhaustive]
     pub enum SimdLevel("SIMD level") {
-        /// The vectors that every CPU of the target has: SSE2 on x86-64, elsewhere those that the compiler makes of
-        /// plain Rust.
+        /// The vectors that every CPU of the target has: SSE2 on x86-64, those of 128 bits on WebAssembly if it is
+        /// built with `-C target-feature=+simd128`, elsewhere those that the compiler makes of plain Rust.
         Portable = "portable",
         /// 256-bit AVX2 of x86-64.
         Avx2 = "avx2",

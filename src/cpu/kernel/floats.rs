@@ -99,7 +99,7 @@ macro_rules! floats {
 }
 
 // Plain Rust, which the compiler turns into the vectors of the target.
-#[cfg(any(test, not(target_arch = "x86_64")))]
+#[cfg(any(test, not(any(target_arch = "x86_64", all(target_arch = "wasm32", target_feature = "simd128")))))]
 floats! {
     f32, 1, bool,
     load std::ptr::read, store std::ptr::write, splat std::convert::identity, root f32::sqrt,
@@ -147,5 +147,24 @@ mod x86 {
         times _mm512_mul_ps,
         or_more _mm512_max_ps,
         or_less _mm512_min_ps
+    }
+}
+
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod wasm {
+    use super::Floats;
+    use std::arch::wasm32::*;
+
+    floats! {
+        v128, 4, v128,
+        load |from: *const f32| v128_load(from.cast()), store |to: *mut f32, part| v128_store(to.cast(), part),
+        splat f32x4_splat, root f32x4_sqrt,
+        at_most f32x4_le, and v128_and, bits |mask| u32::from(i32x4_bitmask(mask)),
+        plus f32x4_add,
+        minus f32x4_sub,
+        times f32x4_mul,
+        // They return the first in doubt, not the other.
+        or_more |a, b| f32x4_pmax(b, a),
+        or_less |a, b| f32x4_pmin(b, a)
     }
 }
