@@ -32,7 +32,7 @@ class Model {
 }
 
 test("a space does what a model of it does, in random calls", () => {
-  for (const seed of [1, 2, 3]) {
+  for (const seed of [1, 2, 3, 4]) {
     const [space, model, next] = [new Space(), new Model(), random(seed)];
     const below = (most) => Math.floor(next() * most);
     const some = (most) => [...model.bodies.keys()].sort(() => next() - 0.5).slice(0, below(most));
@@ -40,7 +40,7 @@ test("a space does what a model of it does, in random calls", () => {
     for (let frame = 0; frame < 120; frame++) {
       // Now and then so little happens that bodies rest.
       const calm = frame % 60 > 25;
-      const boxes = scatter(calm ? 0 : below(20), 1000 * seed + frame);
+      const boxes = scatter(calm ? 0 : below(24), 1000 * seed + frame);
       const count = boxes.length / 6;
       const fixed = Uint8Array.from({ length: count }, () => below(3) === 0);
       const owner = Uint32Array.from({ length: count }, () => below(4));
@@ -52,7 +52,7 @@ test("a space does what a model of it does, in random calls", () => {
       const places = scatter(moved.length, 5000 * seed + frame);
       space.set(big(moved), places);
       moved.forEach((handle, k) => { model.bodies.get(handle).box = places.slice(6 * k, 6 * k + 6); });
-      const gone = some(frame === 59 ? 400 : calm ? 2 : 15);
+      const gone = some(frame === 59 ? 400 : calm ? 2 : 10);
       space.remove(big(gone));
       gone.forEach((handle) => model.bodies.delete(handle));
       space.update();
@@ -64,7 +64,7 @@ test("a space does what a model of it does, in random calls", () => {
       [most, ends] = [Math.max(most, space.pairs().length), ends + space.ended().length];
       queries(space, model, scatter(1, 9000 * seed + frame));
     }
-    assert.ok(most > 200 && ends > 500, `${most} ${ends}`);
+    assert.ok(most > 120 && ends > 400, `${most} ${ends}`);
     space.free();
   }
 });
