@@ -45,9 +45,7 @@ export function fields(lines) {
 function spread(heights, gap) {
   const order = heights.map((_, i) => i).sort((a, b) => heights[a] - heights[b]);
   const moved = [...heights];
-  for (let k = 1; k < order.length; k++) {
-    moved[order[k]] = Math.max(moved[order[k]], moved[order[k - 1]] + gap);
-  }
+  order.slice(1).forEach((i, k) => { moved[i] = Math.max(moved[i], moved[order[k]] + gap); });
   return moved;
 }
 

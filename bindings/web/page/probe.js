@@ -76,6 +76,8 @@ export class ProbeView {
     $("stop").hidden = $("progress").hidden = !measures;
     $("report").hidden = measures || !this.#report;
     if (measures) $("progress").value = 0;
+    // Screen readers hear the end, not every step.
+    $("stage-of-probe").ariaBusy = measures;
   }
 
   #say(sentence) {

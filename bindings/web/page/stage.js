@@ -12,9 +12,9 @@ const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
 /** Draws boxes with one call of WebGL2 a frame, and finds those under a pointer. The third axis points up. */
 export class Stage {
-  azimuth = 0.6;
-  elevation = 0.42;
-  zoom = 1;
+  #azimuth = 0.6;
+  #elevation = 0.42;
+  #zoom = 1;
   #canvas;
   #shaders;
   #gl;
@@ -77,12 +77,12 @@ export class Stage {
 
   /** Turns the camera by angles in radians. */
   turn(azimuth, elevation) {
-    this.azimuth += azimuth;
-    this.elevation = Math.min(1.5, Math.max(-0.2, this.elevation + elevation));
+    this.#azimuth += azimuth;
+    this.#elevation = Math.min(1.5, Math.max(-0.2, this.#elevation + elevation));
   }
 
   magnify(factor) {
-    this.zoom = Math.min(20, Math.max(0.3, this.zoom * factor));
+    this.#zoom = Math.min(20, Math.max(0.3, this.#zoom * factor));
   }
 
   /** Draws a frame. `pace` is the share of the way to its aim that the camera goes, 0 to 1. */
@@ -146,11 +146,11 @@ export class Stage {
   }
 
   #camera() {
-    const [sa, ca, se, ce] = [this.azimuth, this.elevation].flatMap((angle) => [Math.sin(angle), Math.cos(angle)]);
+    const [sa, ca, se, ce] = [this.#azimuth, this.#elevation].flatMap((angle) => [Math.sin(angle), Math.cos(angle)]);
     const [right, up, ahead] = [[ca, sa, 0], [-sa * se, ca * se, ce], [-sa * ce, ca * ce, -se]];
     const aspect = this.#canvas.clientWidth / Math.max(1, this.#canvas.clientHeight);
     const scale = [1 / (OPENING * aspect), 1 / OPENING];
-    const distance = 0.92 * this.#radius / (OPENING * Math.min(1, aspect) * this.zoom);
+    const distance = 1.05 * this.#radius / (OPENING * Math.min(1, aspect) * this.#zoom);
     return { right, up, ahead, scale, distance, eye: add(this.#centre, ahead, -distance) };
   }
 

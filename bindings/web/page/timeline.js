@@ -89,7 +89,8 @@ export class Timeline {
     const y = (ms) => bottom - (bottom - top) * (Math.max(Math.log10(ms), low) - low) / (high - low);
     for (let decade = low; decade <= high; decade++) {
       this.#rule(x(0), x(SPAN - 1), y(10 ** decade));
-      this.#text(power(decade), LEFT - 8, y(10 ** decade), "right", "soft");
+      const roomy = (bottom - top) / (high - low) > 15 || decade % 2 === 0;
+      this.#text(roomy ? power(decade) : "", LEFT - 8, y(10 ** decade), "right", "soft");
     }
     for (const [name, ms] of curves) {
       this.#curve(ms.map((value) => y(value)), x, name ? this.#colour(name) : this.colours.ink, name ? 1.25 : 2);
@@ -103,7 +104,6 @@ export class Timeline {
     const y = (objects) => bottom - (bottom - top) * objects / most;
     this.#rule(x(0), x(SPAN - 1), y(0));
     this.#text(count(most), LEFT - 8, top + 4, "right", "soft");
-    this.#text("0", LEFT - 8, bottom - 5, "right", "soft");
     const heights = history.map((frame) => y(frame.objects));
     this.#curve(heights, x, this.colours.soft, 1.5);
     this.#context.lineTo(x(history.length - 1), bottom);
