@@ -8,8 +8,8 @@
 #
 # VECTORS  +simd128, or -simd128 for browsers without WebAssembly SIMD [default: +simd128]
 #
-# Needs Node.js and the compiler of tools/wasm-compiler.sh; `browser` also Chromium. Installs the command of
-# wasm-bindgen in target/tools/ at first.
+# Needs Node.js with npm, and the compiler of tools/wasm-compiler.sh; `browser` also Chromium. Installs three.js in
+# target/three/, for an example.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 what=${1:-test}
@@ -21,20 +21,15 @@ out=${CARGO_TARGET_DIR:-$root/target}
 manifest=bindings/web/Cargo.toml
 export CARGO_INCREMENTAL=0
 
-# The command must be of the version of the library.
-version=$(sed -n 's/^wasm-bindgen = "=\(.*\)"$/\1/p' $manifest)
-bindgen=$root/target/tools/bin/wasm-bindgen
-[ "$("$bindgen" --version 2>/dev/null)" = "wasm-bindgen $version" ] || {
-    env -u RUSTC -u RUSTC_BOOTSTRAP CARGO_TARGET_DIR="$root/target/tools" CARGO_PROFILE_DEV_DEBUG=false \
-        cargo install wasm-bindgen-cli --version "$version" --locked --debug --quiet --root "$root/target/tools"
-}
+# Runs cargo with the usual compiler.
+usual() { env -u RUSTC -u RUSTC_BOOTSTRAP cargo "$@"; }
 
 RUSTFLAGS="-C target-feature=$vectors" cargo build --quiet --release --locked --manifest-path $manifest \
     --target $target --target-dir "$out/wasm-web$vectors" "${options[@]}"
 rm -rf "$out/npm" "$out/web"
 mkdir -p "$out/npm" "$out/web"
-"$bindgen" --target web --out-name sapwise --out-dir "$out/npm" --remove-name-section --remove-producers-section \
-    "$out/wasm-web$vectors/$target/release/sapwise_web.wasm"
+usual run --quiet --locked --manifest-path tools/bindgen/Cargo.toml --target-dir "$out/tools" -- \
+    "$out/wasm-web$vectors/$target/release/sapwise_web.wasm" "$out/npm"
 rm -f "$out/npm/sapwise_bg.wasm.d.ts"
 cp bindings/web/npm/* LICENSE-* "$out/npm/"
 cp bindings/web/page/* "$out/npm/sapwise.js" "$out/npm/sapwise_bg.wasm" "$out/web/"
@@ -46,10 +41,13 @@ echo "web: $(stat -c %s "$out/npm/sapwise_bg.wasm") bytes of WebAssembly; the pa
 [ "$what" != build ] || exit 0
 
 export SAPWISE_NPM=$out/npm SAPWISE_REPORT=$out/web-report.json
-node --test "bindings/web/tests/node/*.test.mjs"
-check() { env -u RUSTC -u RUSTC_BOOTSTRAP cargo run --quiet --locked -- check "$1"; }
-check "$SAPWISE_REPORT"
+node --test bindings/web/tests/node/*.test.mjs
+# As a user of three.js installs both.
+rm -rf "$out/three"
+cp -r bindings/web/examples/three "$out/three"
+(cd "$out/three" && npm install --no-audit --no-fund --silent "$out/npm" && npm test --silent)
+usual run --quiet --locked -- check "$SAPWISE_REPORT"
 if [ "$what" = browser ]; then
     command -v chromium >/dev/null || fail "chromium is missing"
-    env -u RUSTC -u RUSTC_BOOTSTRAP node bindings/web/tests/browser/run.mjs "$out/web"
+    SAPWISE=$out/debug/sapwise node bindings/web/tests/browser/run.mjs "$out/web"
 fi

@@ -5,7 +5,7 @@ use crate::fault::call;
 use crate::find::named;
 use crate::tuning::adaptive;
 use js_sys::{Float32Array, Uint32Array};
-use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Pairs, Registry};
+use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Pairs, Reason, Registry};
 use std::cell::RefCell;
 use wasm_bindgen::prelude::*;
 
@@ -19,19 +19,26 @@ export interface Decision {
   because: string;
   /** Whether another algorithm ran in the frame before. */
   switched: boolean;
+  /** Whether it is not the cheapest and ran to find out what it costs. */
+  trial: boolean;
 }
 "#;
 
 /// Returns the decision of a search as JavaScript sees it; `before` is the algorithm of the frame before.
 pub(crate) fn decision(search: &Adaptive, before: Option<&AlgorithmId>) -> JsValue {
     search.last_decision().map_or(JsValue::UNDEFINED, |decision| {
-        let ms = |ns: f64| format!("{:.2} ms", ns / 1e6);
+        let ms = |ns: f64| {
+            // Two significant digits.
+            let digits = (7.0 - ns.max(1.0).log10().floor()).clamp(0.0, 6.0) as usize;
+            format!("{:.digits$} ms", ns / 1e6)
+        };
         let next = decision.runner_up.map_or(String::new(), |(id, ns)| format!(", {} {}", id.method(), ms(ns)));
         let expected = decision.predicted_ns.map_or(String::new(), |ns| format!(" ({} expected{next})", ms(ns)));
         object([
             ("algorithm", decision.algorithm.to_string().into()),
             ("because", format!("{}{expected}", decision.reason).into()),
             ("switched", before.is_some_and(|before| before != decision.algorithm).into()),
+            ("trial", (decision.reason == Reason::Explored).into()),
         ])
     })
 }

@@ -108,7 +108,7 @@ impl Probe {
     pub fn new() -> Result<Self, JsError> {
         call(|| {
             let tick_ms = tick_ms();
-            let least_ms = LEAST_MS.max(TICKS * tick_ms);
+            let least_ms = (LEAST_MS.max(TICKS * tick_ms) * 10.0).ceil() / 10.0;
             let (parameters, sweep) = (Parameters::new(least_ms), Sweep::new(least_ms, SEED));
             let began_ms = milliseconds();
             Ok(Self(RefCell::new(State { began_ms, tick_ms, measured: 0, parameters, sweep, text: String::new() })))
@@ -175,6 +175,9 @@ impl Probe {
     pub fn prediction(&self) -> Result<String, JsError> {
         call(|| {
             let state = &*self.0.borrow();
+            if state.sweep.points.is_empty() {
+                return Ok("[]".to_owned());
+            }
             let tuning = predicted(&state.hardware())?;
             let of_point = |(load, point): &(Load, Value)| {
                 let scenario = point["scenario"].clone();

@@ -61,6 +61,9 @@ impl Parameters {
     }
 
     fn add(&mut self, id: ParameterId, statistic: Statistic, raw: Vec<f64>, method: &str) {
+        if raw.is_empty() {
+            return;
+        }
         let six_digits = |x: &f64| format!("{x:.5e}").parse().unwrap_or(*x);
         let method = format!("{method}, each sample at least {} ms", self.least_ms);
         self.done.push(Parameter::from_samples(id, statistic, raw.iter().map(six_digits).collect(), &method));

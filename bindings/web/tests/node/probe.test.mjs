@@ -9,6 +9,7 @@ test("a probe ends within a minute, and its report holds what it measured", () =
   let last = { done: 0, of: 1 };
   let longest = 0;
   assert.match(JSON.parse(probe.report()).remarks.at(-1), /^unfinished: 0 of/);
+  assert.equal(probe.prediction(), "[]");
   while (last.done < last.of) {
     const started = performance.now();
     const progress = probe.step();
