@@ -10,6 +10,11 @@ const MOST_RISE: f64 = 2.0;
 pub(crate) struct MeanTime(Option<f64>);
 
 impl MeanTime {
+    /// Starts with the time of a frame.
+    pub(crate) fn of(now: f64) -> Self {
+        Self(Some(now))
+    }
+
     /// Adds the time of a frame.
     pub(crate) fn add(&mut self, now: f64) {
         self.0 = Some(self.0.map_or(now, |mean| mean + (now.min(MOST_RISE * mean) - mean) / FRAMES));

@@ -2,8 +2,10 @@
 
 use crate::cpu::mean_time::MeanTime;
 
-/// Frames from scratch before pairs are kept: one that builds the tree, and two that may refit it.
-const FEWEST_FRAMES: u32 = 3;
+/// Frames from scratch before pairs are kept, and the first that counts: one builds the tree, the next may refit it. The
+/// least of those up to the last counts, since one that was interrupted would make keeping look cheap for good.
+const FEWEST_FRAMES: u32 = 6;
+const FIRST_COUNTED: u32 = 3;
 
 /// Keeping stops when it has cost this many frames from scratch more than finding as many from scratch. To begin costs
 /// one or two.
@@ -55,10 +57,12 @@ impl Prices {
     /// Learns from a frame from scratch, of which the model says `model`.
     pub(super) fn add_scratch(&mut self, took: f32, model: f32) {
         self.frames = self.frames.saturating_add(1);
-        if self.frames < FEWEST_FRAMES {
-            self.scratch = MeanTime::default();
+        let now = f64::from(took / model);
+        match self.frames {
+            ..FIRST_COUNTED => {}
+            ..=FEWEST_FRAMES => self.scratch = MeanTime::of(self.scratch.get().map_or(now, |least| least.min(now))),
+            _ => self.scratch.add(now),
         }
-        self.scratch.add(f64::from(took / model));
     }
 
     /// Whether keeping is worth a try, by what the model says. The clock ends a try that does not pay; what it has shown
@@ -114,11 +118,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn keeping_is_tried_after_three_frames_and_stops_when_it_has_lost_four() {
+    fn keeping_is_tried_after_six_frames_and_stops_when_it_has_lost_four() {
         let mut prices = Prices::new(true);
-        for _ in 0..3 {
+        for frame in 0..6 {
             assert!(!prices.begins(10.0, 40.0));
-            prices.add_scratch(50.0, 40.0);
+            // The tree is built, and one frame is interrupted.
+            prices.add_scratch(if frame < 2 || frame == 4 { 500.0 } else { 50.0 }, 40.0);
         }
         assert!(!prices.begins(41.0, 40.0) && prices.begins(39.0, 40.0));
         // The first frame builds. Then half a frame is saved in each.
