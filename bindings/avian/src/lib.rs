@@ -11,27 +11,33 @@
 //! App::new().add_plugins((MinimalPlugins, TransformPlugin, physics));
 //! ```
 //!
-//! It finds the pairs that avian's own finds, in the same steps: layers, sensors, [`CollisionHooks`], joints without
-//! collisions, disabled bodies and colliders, standalone colliders. Tests compare the two in every step.
+//! It finds the pairs that avian's own broad phase finds, in the same steps: by layers, sensors, [`CollisionHooks`],
+//! joints without collisions, disabled bodies and colliders, and colliders without a body. Tests compare both in every
+//! step.
 //!
-//! With hooks of type `H`, replace avian's plugin by the one with the same hooks:
+//! With hooks `H`, it replaces the plugin that has them:
 //!
 //! ```
 //! # use avian3d::prelude::*;
+//! # use bevy::{app::PluginGroupBuilder, ecs::system::SystemParamItem};
 //! # use sapwise_avian::SapwiseBroadPhasePlugin;
-//! # fn physics<H: CollisionHooks + 'static>() -> bevy::app::PluginGroupBuilder
-//! # where for<'w, 's> bevy::ecs::system::SystemParamItem<'w, 's, H>: CollisionHooks {
-//! PhysicsPlugins::default().with_collision_hooks::<H>().build().disable::<BvhBroadPhasePlugin<H>>()
-//!     .add(SapwiseBroadPhasePlugin::<H>::default())
+//! # fn physics<H: CollisionHooks + 'static>() -> PluginGroupBuilder
+//! # where
+//! #     for<'w, 's> SystemParamItem<'w, 's, H>: CollisionHooks,
+//! # {
+//! let physics = PhysicsPlugins::default().with_collision_hooks::<H>().build();
+//! physics.disable::<BvhBroadPhasePlugin<H>>().add(SapwiseBroadPhasePlugin::<H>::default())
 //! # }
 //! ```
 //!
-//! **What it costs.** Only colliders that left their enlarged box are set, those that avian's trees list as moved. So
-//! static and sleeping bodies cost nothing. avian keeps its trees for spatial queries, and that costs what it did:
-//! `ColliderTreeDiagnostics` has it, and `CollisionDiagnostics::broad_phase` has the broad phase.
+//! **Cost.** A step sets the colliders that avian's trees list as moved: those that left their enlarged box. Static and
+//! sleeping bodies cost nothing. avian keeps its trees for spatial queries; their time is in `ColliderTreeDiagnostics`,
+//! and that of the broad phase in [`CollisionDiagnostics::broad_phase`].
 //!
-//! **Precision.** The feature `f32` is on by default. For `f64` turn the default features off and `f64` on; boxes are
-//! `f32` all the same, as in avian's trees.
+//! **Precision.** The feature `f32` is on by default. For `f64`, turn the default features off and `f64` on. Boxes are
+//! `f32` in both, as in avian's trees.
+//!
+//! **Versions.** avian3d 0.8 and Bevy 0.20, which asks for Rust 1.97.1.
 
 mod mirror;
 #[cfg(test)]
@@ -58,8 +64,9 @@ pub struct SapwiseBroadPhasePlugin<H: CollisionHooks = ()> {
 }
 
 impl<H: CollisionHooks> SapwiseBroadPhasePlugin<H> {
-    /// Makes the plugin with the space that `space` returns, which is to be empty. So it searches by a tuning of this
-    /// machine.
+    /// Makes the plugin with the empty space that `space` returns, for one that searches by a tuning of this machine:
+    /// see [`Space::with`].
+    #[must_use]
     pub fn with(space: fn() -> Space) -> Self {
         Self { space, hooks: PhantomData }
     }

@@ -76,16 +76,29 @@ fn meet(app: &App, one: Entity, other: Entity) -> bool {
     app.world().resource::<ContactGraph>().contains(one, other)
 }
 
-/// Moves a collider out of its enlarged box, and makes a step.
-fn nudge(app: &mut App, collider: Entity) {
-    app.world_mut().get_mut::<Position>(collider).unwrap().0.x += 0.2;
+/// Moves a collider and makes a step.
+fn shift(app: &mut App, collider: Entity, by: f32) {
+    app.world_mut().get_mut::<Position>(collider).unwrap().0.x += by;
     app.update();
 }
 
-fn without_gravity() -> App {
-    let mut app = empty(shadowed());
-    app.insert_resource(Gravity::ZERO);
-    app
+/// Moves a collider just out of its enlarged box, and makes a step.
+fn nudge(app: &mut App, collider: Entity) {
+    shift(app, collider, 0.2);
+}
+
+/// avian with a shadow, and with the plugin in the place of its own.
+fn both() -> [App; 2] {
+    let other = PhysicsPlugins::default().with_collision_hooks::<Hooks>().build();
+    let other = other.disable::<BvhBroadPhasePlugin<Hooks>>().add(SapwiseBroadPhasePlugin::<Hooks>::default());
+    [shadowed(), other].map(empty)
+}
+
+fn without_gravity() -> [App; 2] {
+    both().map(|mut app| {
+        app.insert_resource(Gravity::ZERO);
+        app
+    })
 }
 
 #[test]
@@ -121,113 +134,119 @@ fn scenes_settle_as_with_the_other_broad_phase() {
 
 #[test]
 fn layers_decide() {
-    let mut app = without_gravity();
-    let [a, b] = [1, 2].map(|layer| ball(&mut app, (RigidBody::Dynamic, CollisionLayers::new(layer, layer))));
-    app.update();
-    assert!(!meet(&app, a, b));
-    app.world_mut().entity_mut(b).insert(CollisionLayers::new(1, 1));
-    app.update();
-    // avian looks when one of them moves.
-    assert!(!meet(&app, a, b));
-    nudge(&mut app, a);
-    assert!(meet(&app, a, b));
+    for mut app in without_gravity() {
+        let [a, b] = [1, 2].map(|layer| ball(&mut app, (RigidBody::Dynamic, CollisionLayers::new(layer, layer))));
+        app.update();
+        assert!(!meet(&app, a, b));
+        app.world_mut().entity_mut(b).insert(CollisionLayers::new(1, 1));
+        app.update();
+        // avian looks when one of them moves.
+        assert!(!meet(&app, a, b));
+        nudge(&mut app, a);
+        assert!(meet(&app, a, b));
+    }
 }
 
 #[test]
 fn sensors_meet_static_colliders_and_push_nothing() {
-    let mut app = without_gravity();
-    let [wall, still, moving] = [
-        ball(&mut app, RigidBody::Static),
-        ball(&mut app, (RigidBody::Static, Sensor)),
-        ball(&mut app, (RigidBody::Dynamic, Sensor)),
-    ];
-    let other = ball(&mut app, RigidBody::Static);
-    app.update();
-    assert!(!meet(&app, wall, other));
-    for (one, other) in [(wall, still), (wall, moving), (still, moving)] {
-        let (_, pair) = app.world().resource::<ContactGraph>().get(one, other).unwrap();
-        assert!(!pair.generates_constraints());
+    for mut app in without_gravity() {
+        let [wall, still, moving] = [
+            ball(&mut app, RigidBody::Static),
+            ball(&mut app, (RigidBody::Static, Sensor)),
+            ball(&mut app, (RigidBody::Dynamic, Sensor)),
+        ];
+        let other = ball(&mut app, RigidBody::Static);
+        app.update();
+        assert!(!meet(&app, wall, other));
+        for (one, other) in [(wall, still), (wall, moving), (still, moving)] {
+            let (_, pair) = app.world().resource::<ContactGraph>().get(one, other).unwrap();
+            assert!(!pair.generates_constraints());
+        }
+        // Static colliders are no pairs of the space.
+        assert!(app.world().resource::<BroadPhase>().refused.is_empty());
+        // avian looks for what a static sensor meets when that moves.
+        shift(&mut app, wall, 50.0);
+        shift(&mut app, wall, -50.0);
+        assert!(!meet(&app, wall, still));
+        nudge(&mut app, still);
+        assert!(meet(&app, wall, still));
     }
-    app.world_mut().entity_mut(still).remove::<Sensor>();
-    nudge(&mut app, still);
-    assert!(!meet(&app, wall, still));
-    app.world_mut().entity_mut(still).insert(Sensor);
-    nudge(&mut app, wall);
-    assert!(!meet(&app, wall, still));
-    nudge(&mut app, still);
-    assert!(meet(&app, wall, still));
 }
 
 #[test]
 fn sleeping_bodies_cost_no_update_and_wake() {
-    let mut app = empty(shadowed());
-    let ground = app.world_mut().spawn((RigidBody::Static, Collider::cuboid(9.0, 1.0, 9.0))).id();
-    let collider = Collider::cuboid(1.0, 1.0, 1.0);
-    let cube = app.world_mut().spawn((RigidBody::Dynamic, collider, Transform::from_xyz(0.0, 1.0, 0.0))).id();
-    steps(&mut app, 200);
-    assert!(app.world().entity(cube).contains::<Sleeping>() && meet(&app, ground, cube));
-    // Queries find a body from the next update on.
-    let far = sapwise::Aabb::cube([1000.0; 3], 1.0);
-    app.world_mut().resource_mut::<BroadPhase>().mirror.space.insert(far, sapwise::Body::default()).unwrap();
-    let found = |app: &App| {
-        let mut found = 0;
-        app.world().resource::<BroadPhase>().mirror.space.query_box(&far, |_| found += 1).unwrap();
-        found
-    };
-    steps(&mut app, 10);
-    assert_eq!(found(&app), 0);
-    let other = ball(&mut app, (RigidBody::Dynamic, LinearVelocity::ZERO));
-    app.world_mut().get_mut::<Position>(other).unwrap().0.y = 2.5;
-    steps(&mut app, 60);
-    assert!(found(&app) == 1 && meet(&app, cube, other));
-    assert!(!app.world().entity(cube).contains::<Sleeping>());
+    for mut app in both() {
+        let ground = app.world_mut().spawn((RigidBody::Static, Collider::cuboid(9.0, 1.0, 9.0))).id();
+        let collider = Collider::cuboid(1.0, 1.0, 1.0);
+        let cube = app.world_mut().spawn((RigidBody::Dynamic, collider, Transform::from_xyz(0.0, 1.0, 0.0))).id();
+        steps(&mut app, 200);
+        assert!(app.world().entity(cube).contains::<Sleeping>() && meet(&app, ground, cube));
+        // Queries find a body from the next update on.
+        let far = sapwise::Aabb::cube([1000.0; 3], 1.0);
+        app.world_mut().resource_mut::<BroadPhase>().mirror.space.insert(far, sapwise::Body::default()).unwrap();
+        let found = |app: &App| {
+            let mut found = 0;
+            app.world().resource::<BroadPhase>().mirror.space.query_box(&far, |_| found += 1).unwrap();
+            found
+        };
+        steps(&mut app, 10);
+        assert_eq!(found(&app), 0);
+        let other = ball(&mut app, (RigidBody::Dynamic, LinearVelocity::ZERO));
+        app.world_mut().get_mut::<Position>(other).unwrap().0.y = 2.5;
+        steps(&mut app, 60);
+        assert!(found(&app) == 1 && meet(&app, cube, other));
+        assert!(!app.world().entity(cube).contains::<Sleeping>());
+    }
 }
 
 #[test]
 fn hooks_are_asked_again_when_a_collider_moves() {
-    let mut app = without_gravity();
-    let ghost = ball(&mut app, (RigidBody::Dynamic, Ghost, ActiveCollisionHooks::FILTER_PAIRS));
-    let other = ball(&mut app, RigidBody::Dynamic);
-    app.update();
-    assert!(!meet(&app, ghost, other));
-    app.world_mut().entity_mut(ghost).remove::<Ghost>();
-    app.update();
-    assert!(!meet(&app, ghost, other));
-    nudge(&mut app, other);
-    assert!(meet(&app, ghost, other));
+    for mut app in without_gravity() {
+        let ghost = ball(&mut app, (RigidBody::Dynamic, Ghost, ActiveCollisionHooks::FILTER_PAIRS));
+        let other = ball(&mut app, RigidBody::Dynamic);
+        app.update();
+        assert!(!meet(&app, ghost, other));
+        app.world_mut().entity_mut(ghost).remove::<Ghost>();
+        app.update();
+        assert!(!meet(&app, ghost, other));
+        nudge(&mut app, other);
+        assert!(meet(&app, ghost, other));
+    }
 }
 
 #[test]
 fn joints_and_parts_of_a_body_do_not_meet() {
-    let mut app = without_gravity();
-    let [a, b] = [0, 1].map(|_| ball(&mut app, RigidBody::Dynamic));
-    let joint = app.world_mut().spawn((FixedJoint::new(a, b), JointCollisionDisabled)).id();
-    let part = ball(&mut app, ChildOf(a));
-    let [alone, lonely] = [0, 1].map(|_| ball(&mut app, ()));
-    steps(&mut app, 3);
-    assert!(!meet(&app, a, b) && !meet(&app, a, part) && !meet(&app, alone, lonely));
-    assert!(meet(&app, a, alone) && meet(&app, part, lonely));
-    app.world_mut().despawn(joint);
-    nudge(&mut app, a);
-    assert!(meet(&app, a, b));
+    for mut app in without_gravity() {
+        let [a, b] = [0, 1].map(|_| ball(&mut app, RigidBody::Dynamic));
+        let joint = app.world_mut().spawn((FixedJoint::new(a, b), JointCollisionDisabled)).id();
+        let part = ball(&mut app, ChildOf(a));
+        let [alone, lonely] = [0, 1].map(|_| ball(&mut app, ()));
+        steps(&mut app, 3);
+        assert!(!meet(&app, a, b) && !meet(&app, a, part) && !meet(&app, alone, lonely));
+        assert!(meet(&app, a, alone) && meet(&app, part, lonely));
+        app.world_mut().despawn(joint);
+        nudge(&mut app, a);
+        assert!(meet(&app, a, b));
+    }
 }
 
 #[test]
 fn pairs_that_someone_removed_come_again() {
-    let mut app = without_gravity();
-    let [a, b, c] = [0, 1, 2].map(|_| ball(&mut app, RigidBody::Dynamic));
-    app.update();
-    // Within one step, so that the trees show the same collider in the same place.
-    app.world_mut().entity_mut(a).insert(ColliderDisabled).remove::<ColliderDisabled>();
-    app.update();
-    assert!(meet(&app, a, b) && meet(&app, a, c));
-    app.world_mut().entity_mut(a).insert(RigidBody::Static);
-    app.world_mut().entity_mut(b).insert(ColliderDisabled);
-    app.world_mut().despawn(c);
-    let d = ball(&mut app, RigidBody::Kinematic);
-    app.update();
-    assert!(meet(&app, a, d) && !meet(&app, a, b));
-    app.world_mut().entity_mut(b).remove::<ColliderDisabled>();
-    app.update();
-    assert!(meet(&app, a, b) && meet(&app, b, d));
+    for mut app in without_gravity() {
+        let [a, b, c] = [0, 1, 2].map(|_| ball(&mut app, RigidBody::Dynamic));
+        app.update();
+        // Within one step, so that the trees show the same collider in the same place.
+        app.world_mut().entity_mut(a).insert(ColliderDisabled).remove::<ColliderDisabled>();
+        app.update();
+        assert!(meet(&app, a, b) && meet(&app, a, c));
+        app.world_mut().entity_mut(a).insert(RigidBody::Static);
+        app.world_mut().entity_mut(b).insert(ColliderDisabled);
+        app.world_mut().despawn(c);
+        let d = ball(&mut app, RigidBody::Kinematic);
+        app.update();
+        assert!(meet(&app, a, d) && !meet(&app, a, b));
+        app.world_mut().entity_mut(b).remove::<ColliderDisabled>();
+        app.update();
+        assert!(meet(&app, a, b) && meet(&app, b, d));
+    }
 }
