@@ -84,13 +84,13 @@ export class Demo {
     const start = performance.now();
     this.pairs = this.#adaptive.update(this.boxes);
     const ms = performance.now() - start;
-    const { algorithm, because } = this.#adaptive.decision();
+    const { algorithm, because, trial } = this.#adaptive.decision();
     const fixed = new Map();
     for (const [name, contestant] of this.fixed) fixed.set(name, contestant.run(this.boxes));
     this.#encounters.update(this.pairs, this.objects);
     const [{ begun, ended }, { objects, frame }] = [this.#encounters, this];
     // A trial of some frames is no switch.
-    if (algorithm !== this.#incumbent && !because.includes("tried")) {
+    if (algorithm !== this.#incumbent && !trial) {
       if (this.#incumbent) this.switches.unshift({ frame, objects, from: this.#incumbent, to: algorithm, because });
       this.switches.splice(SWITCHES);
       this.#incumbent = algorithm;

@@ -17,9 +17,6 @@ export const power = (decade) => decade < 0 ? (10 ** decade).toFixed(-decade) : 
 export const label = (algorithm) => algorithm.replace(/@cpu1$/, "").replace(/@cpu(\d+)$/, ", $1 threads")
   .replace(/@gpu.*$/, ", GPU");
 
-/** @returns why an algorithm was chosen, without its name in front and the counts of the load at the end */
-export const reason = (because) => because.replace(/^\S+, /, "").replaceAll("@cpu1", "").split(";")[0];
-
 /** @returns the values of the colours of the style sheet by their names without dashes, for canvases */
 export function colours(names) {
   const style = getComputedStyle(document.documentElement);

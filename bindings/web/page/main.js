@@ -67,6 +67,8 @@ $("pause").addEventListener("click", () => run(!running));
 $("step").addEventListener("click", step);
 $("restart").addEventListener("click", restart);
 $("scene").addEventListener("change", restart);
+// What is measured must not be disturbed.
+$("measure").addEventListener("click", () => run(false));
 resize(FIRST);
 run(running);
 if (!running) panel.notice(LESS_MOTION);

@@ -1,5 +1,5 @@
 import { recent } from "./demo.js";
-import { count, hue, label, milliseconds, reason } from "./format.js";
+import { count, hue, label, milliseconds } from "./format.js";
 
 /** Frames over which numbers are averaged. */
 const FRAMES = 30;
@@ -68,7 +68,7 @@ export class Panel {
     const last = history.at(-1);
     const ms = recent(history, FRAMES, (frame) => frame.ms);
     $("running").replaceChildren(swatch(this.#algorithms.indexOf(last.algorithm)),
-      element("b", {}, label(last.algorithm)), ` runs: ${reason(last.because)}.`);
+      element("b", {}, label(last.algorithm)), ` runs: ${last.because}.`);
     $("ms").textContent = milliseconds(ms);
     $("count").textContent = count(last.objects);
     $("pairs").textContent = count(last.pairs);
@@ -81,7 +81,7 @@ export class Panel {
     }
     $("switches").replaceChildren(...switches.map(({ frame, objects, from, to, because }) => element("li", {},
       swatch(this.#algorithms.indexOf(to)), " ", element("b", {}, `${label(from)} → ${label(to)}`),
-      ` in frame ${count(frame)}, ${count(objects)} objects: ${reason(because)}.`)));
+      ` in frame ${count(frame)}, ${count(objects)} objects: ${because}.`)));
     $("timeline").ariaLabel = `Last ten seconds: ${label(last.algorithm)} runs, ${milliseconds(ms)} milliseconds a `
       + `frame, ${count(last.objects)} objects.`;
   }

@@ -104,14 +104,15 @@ async function compareWithDoubleLoop(scene) {
   return new Set(demo.history.map(({ algorithm }) => algorithm)).size;
 }
 
-/** Checks a report by the command. */
-function check(name, report) {
+/** Checks a report by the command, which calls it good or, if it is cut short, doubtful. */
+function check(name, report, verdict) {
   const file = join(pictures, `${name}.json`);
   writeFileSync(file, report);
   const [command, ...options] = process.env.SAPWISE ? [process.env.SAPWISE]
     : ["cargo", "run", "--quiet", "--locked", "--package", "sapwise-cli", "--"];
   const { status, stdout, stderr } = spawnSync(command, [...options, "check", file], { encoding: "utf8" });
   assert.equal(status, 0, `sapwise check refuses ${file}: ${stdout}${stderr}`);
+  assert.match(stdout, verdict);
 }
 const report = (page) => page.evaluate('fetch(document.getElementById("report").href).then((r) => r.text())');
 
@@ -274,7 +275,7 @@ const tests = {
     await page.evaluate('document.getElementById("measure").click()');
     await page.until('!document.getElementById("report").hidden', 150);
     const took = Date.now() - began;
-    check("report", await report(page));
+    check("report", await report(page), /report\/3 good/);
     assert.match(await text(page, "stage-of-probe"), /^Measured, in /);
     assert.ok(await page.evaluate('document.querySelectorAll("#curves svg").length') >= 3, "fewer than three scenes");
     assert.ok(await page.evaluate('document.querySelectorAll("#hardware tbody tr").length') >= 3, "few parameters");
@@ -296,7 +297,7 @@ const tests = {
     await page.evaluate('document.getElementById("stop").click()');
     await page.until('!document.getElementById("report").hidden');
     assert.match(await text(page, "stage-of-probe"), /^Stopped/);
-    check("stopped", await report(page));
+    check("stopped", await report(page), /cut short/);
     await page.close();
   },
 
