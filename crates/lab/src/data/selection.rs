@@ -61,6 +61,7 @@ impl Selection {
 
     /// Returns the profiles with the newest revision of each method only, and what was left out and why.
     pub fn finish(mut self) -> (Vec<Profile>, Vec<String>) {
+        self.keep_apart();
         let newest = newest_revisions(&self.profiles);
         let newest_of = |id: &AlgorithmId| newest.get(&key(id)).copied().unwrap_or(0);
         for profile in &mut self.profiles {
@@ -77,6 +78,19 @@ impl Selection {
         let why = format!("no point has {FEWEST_SAMPLES} samples of a current algorithm");
         self.notes.extend(empty.iter().map(|p| format!("{} is left out: {why}", p.file)));
         (kept, self.notes)
+    }
+
+    /// Leaves out the reports of browsers if there are others. WebAssembly makes each method slower by another factor,
+    /// which no hardware parameter shows.
+    fn keep_apart(&mut self) {
+        let is_of_browser = |profile: &Profile| profile.label == Label::RealBrowser;
+        if !self.profiles.iter().all(is_of_browser) {
+            let why =
+                "it was measured in a browser, which is no evidence about native builds; train on such reports alone";
+            let apart = self.profiles.iter().filter(|profile| is_of_browser(profile));
+            self.notes.extend(apart.map(|profile| format!("{} is left out: {why}", profile.file)));
+            self.profiles.retain(|profile| !is_of_browser(profile));
+        }
     }
 }
 
@@ -144,6 +158,16 @@ mod tests {
             "the same measurement",
         ];
         assert!(said.iter().all(|t| notes.iter().any(|n| n.contains(t))) && notes.len() == 6, "{notes:?}");
+    }
+
+    #[test]
+    fn reports_of_browsers_are_kept_apart() {
+        let [one, mut browser] = [0, 1].map(|k| Machine::family()[k].report());
+        browser.label = Label::RealBrowser;
+        let (profiles, notes) = selected([one, browser.clone()]);
+        assert_eq!((profiles.len(), profiles[0].label), (1, Label::RealFull));
+        assert!(notes.len() == 1 && notes[0].contains("in a browser"), "{notes:?}");
+        assert_eq!(selected([browser]).0.len(), 1);
     }
 
     #[test]

@@ -42,6 +42,8 @@ pub enum Label {
     RealContended,
     /// A real machine whose GPU is a software adapter on its CPU.
     RealSoftwareGpu,
+    /// A real machine, measured by a page in its browser.
+    RealBrowser,
     /// Parameters from a publication, without timings.
     Published,
 }
