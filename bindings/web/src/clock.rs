@@ -6,8 +6,9 @@ use wasm_bindgen::prelude::*;
 /// Readings until the clock counts as coarse: some milliseconds.
 const MOST_READINGS: u32 = 100_000;
 
-/// Ticks to watch. The first begins anywhere between two.
-const TICKS: usize = 8;
+/// Milliseconds to watch, and the fewest ticks. The first begins anywhere between two.
+const WATCHED_MS: f64 = 1.0;
+const FEWEST: usize = 2;
 
 /// The tick of a clock that stood still meanwhile: that of a browser that hides the time.
 const COARSEST_MS: f64 = 100.0;
@@ -35,17 +36,20 @@ fn duration(ms: f64) -> Duration {
 /// Returns the least difference of two readings in milliseconds. Pages that are not cross-origin isolated get a clock
 /// that ticks every 0.1 ms or every millisecond.
 pub(crate) fn tick_ms() -> f64 {
-    let (mut last, mut ticks) = (milliseconds(), Vec::new());
+    let began = milliseconds();
+    let (mut last, mut ticks, mut least) = (began, 0, COARSEST_MS);
     for _ in 0..MOST_READINGS {
         let now = milliseconds();
         if now > last {
-            ticks.push(now - last);
-            last = now;
-            // Of a coarse clock two are enough.
-            if ticks.len() > TICKS || ticks.len() > 1 && ticks.iter().sum::<f64>() > 1.0 {
-                break;
+            ticks += 1;
+            if ticks >= FEWEST {
+                least = least.min(now - last);
+                if now - began > WATCHED_MS {
+                    break;
+                }
             }
+            last = now;
         }
     }
-    ticks.into_iter().skip(1).reduce(f64::min).unwrap_or(COARSEST_MS)
+    least
 }
