@@ -58,10 +58,10 @@ impl Prices {
     pub(super) fn add_scratch(&mut self, took: f32, model: f32) {
         self.frames = self.frames.saturating_add(1);
         let now = f64::from(took / model);
-        match self.frames {
-            ..FIRST_COUNTED => {}
-            ..=FEWEST_FRAMES => self.scratch = MeanTime::of(self.scratch.get().map_or(now, |least| least.min(now))),
-            _ => self.scratch.add(now),
+        if self.frames > FEWEST_FRAMES {
+            self.scratch.add(now);
+        } else if self.frames >= FIRST_COUNTED {
+            self.scratch = MeanTime::of(self.scratch.get().map_or(now, |least| least.min(now)));
         }
     }
 
