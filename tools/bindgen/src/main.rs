@@ -12,6 +12,8 @@ fn main() -> anyhow::Result<()> {
     let [module, folder] = &arguments[..] else { bail!("give a module and a folder") };
     let mut bindgen = Bindgen::new();
     bindgen.input_path(module).web(true)?.out_name("sapwise").typescript(true);
+    // `init()` without an argument loads the module from beside the script.
+    bindgen.omit_default_module_path(false);
     bindgen.remove_name_section(true).remove_producers_section(true);
     bindgen.generate(folder).with_context(|| module.clone())
 }
