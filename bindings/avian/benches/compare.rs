@@ -6,12 +6,23 @@ mod scenes;
 
 use avian3d::collider_tree::ColliderTreeDiagnostics;
 use avian3d::collision::CollisionDiagnostics;
-use avian3d::diagnostics::PhysicsTotalDiagnostics;
 use avian3d::prelude::*;
 use bevy::prelude::*;
 use sapwise_avian::SapwiseBroadPhasePlugin;
 use scenes::scenes;
-use std::time::Duration;
+use std::time::{Duration, Instant};
+
+/// When a step began, and how long it took.
+#[derive(Resource)]
+struct Step(Instant, Duration);
+
+/// Times the steps of avian alone, without the rest of an update.
+fn time_steps(app: &mut App) {
+    let begin = |mut step: ResMut<Step>| step.0 = Instant::now();
+    let end = |mut step: ResMut<Step>| step.1 = step.0.elapsed();
+    let systems = (begin.before(PhysicsStepSystems::First), end.after(PhysicsStepSystems::Last));
+    app.insert_resource(Step(Instant::now(), Duration::ZERO)).add_systems(PhysicsSchedule, systems);
+}
 
 /// The times of the steps of one app.
 #[derive(Default)]
@@ -28,7 +39,7 @@ impl Times {
         let trees = world.resource::<ColliderTreeDiagnostics>();
         self.broad_phase.push(world.resource::<CollisionDiagnostics>().broad_phase);
         self.trees.push(trees.update + trees.optimize);
-        self.step.push(world.resource::<PhysicsTotalDiagnostics>().step_time);
+        self.step.push(world.resource::<Step>().1);
     }
 }
 
@@ -46,9 +57,9 @@ fn main() {
          step_median_ms,step_p99_ms"
     );
     for scene in scenes(share) {
-        let physics = PhysicsPlugins::default().build();
-        let other = PhysicsPlugins::default().build().disable::<BvhBroadPhasePlugin>();
-        let mut apps = [scene.app(physics), scene.app(other.add(SapwiseBroadPhasePlugin::<()>::default()))];
+        let physics = || PhysicsPlugins::default().build().add(time_steps);
+        let other = physics().disable::<BvhBroadPhasePlugin>();
+        let mut apps = [scene.app(physics()), scene.app(other.add(SapwiseBroadPhasePlugin::<()>::default()))];
         let mut times = [Times::default(), Times::default()];
         for step in 0..steps {
             // Neither always comes first.

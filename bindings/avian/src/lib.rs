@@ -19,7 +19,7 @@
 //!
 //! ```
 //! # use avian3d::prelude::*;
-//! # use bevy::{app::PluginGroupBuilder, ecs::system::SystemParamItem};
+//! # use bevy::{app::PluginGroupBuilder, ecs::system::SystemParamItem, prelude::PluginGroup};
 //! # use sapwise_avian::SapwiseBroadPhasePlugin;
 //! # fn physics<H: CollisionHooks + 'static>() -> PluginGroupBuilder
 //! # where
