@@ -233,19 +233,21 @@ fn a_drop_ends_the_thread() {
     assert_eq!(count(folder.path()), 0);
 }
 
-/// A registry whose `brute@cpu1` comes from `make`.
-fn with_brute(make: impl Fn() -> Result<Box<dyn BroadPhase>, Error> + Send + Sync + 'static) -> Arc<Registry> {
+/// A registry whose `bvh@cpu1` comes from `make`, and takes part: the model does not know this revision of `pair-cache`.
+fn with_bvh(make: impl Fn() -> Result<Box<dyn BroadPhase>, Error> + Send + Sync + 'static) -> Arc<Registry> {
     let mut registry = Registry::with_cores(1);
-    let id: AlgorithmId = "brute@cpu1".parse().unwrap();
-    let revision = registry.entries().iter().find(|e| e.id == id).unwrap().revision;
-    registry.add(id, revision, make);
+    let tree: AlgorithmId = "bvh@cpu1".parse().unwrap();
+    let revision = registry.entries().iter().find(|e| e.id == tree).unwrap().revision;
+    registry.add(tree, revision, make);
+    let pair_cache: AlgorithmId = "pair-cache@cpu1".parse().unwrap();
+    registry.add(pair_cache.clone(), u32::MAX, move || Registry::with_cores(1).create(&pair_cache));
     Arc::new(registry)
 }
 
 #[test]
 fn a_panic_in_the_background_is_a_remark() {
     let folder = tempfile::tempdir().unwrap();
-    let registry = with_brute(|| panic!("as the test wants"));
+    let registry = with_bvh(|| panic!("as the test wants"));
     let mut adaptive = start(&options(folder.path()).background(true).registry(registry));
     frames_until_it_came(&mut adaptive);
     assert_eq!((origin(&adaptive), adaptive.tuning().source), (Origin::Usual, Source::Default));
@@ -259,10 +261,10 @@ fn the_background_makes_the_algorithms_once() {
     static MADE: AtomicUsize = AtomicUsize::new(0);
     let folder = tempfile::tempdir().unwrap();
     let caller = std::thread::current().id();
-    let registry = with_brute(move || {
+    let registry = with_bvh(move || {
         assert_ne!(std::thread::current().id(), caller);
         MADE.fetch_add(1, Relaxed);
-        Registry::with_cores(1).create(&"brute@cpu1".parse().unwrap())
+        Registry::with_cores(1).create(&"bvh@cpu1".parse().unwrap())
     });
     let mut adaptive = start(&options(folder.path()).background(true).registry(registry));
     frames_until_it_came(&mut adaptive);
