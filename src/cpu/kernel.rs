@@ -331,8 +331,9 @@ pub(crate) fn corners(b: &Aabb) -> [Four; 2] {
             [[_mm_loadu_ps(at)], [_mm_castsi128_ps(high)]]
         }
     }
+    // SAFETY: every CPU of the target has the instructions of `Four`; there are four floats to read.
     #[cfg(not(target_arch = "x86_64"))]
-    [b.min, b.max].map(|[x, y, z]| [x, y, z, 0.0])
+    [b.min, b.max].map(|[x, y, z]| unsafe { Four::load([x, y, z, 0.0].as_ptr()) })
 }
 
 /// Writes the pairs of a box with each of the others whose bit is set to the head of `room`.
