@@ -22,6 +22,7 @@ import tempfile
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 TABLE = ROOT / "results/inline.csv"
 LEARNED = "300"
+TUNINGS = ["predicted", "measured", "other"]
 STEADY = ["uniform", "fast", "clustered", "slab", "mixed", "resting", "brownian", "free-fall", "gravity"]
 # Scenes whose best algorithm changes: recorded streams and the numbers of objects that swing.
 STREAMS = ["level", "fight", "pooled"]
@@ -74,6 +75,7 @@ def main():
     parser.add_argument("--predicted", help="tuning by a model that has not seen this machine [default: built-in model]")
     parser.add_argument("--repeats", default="5")
     parser.add_argument("--only", nargs="*", default=[], help="names of scenes")
+    parser.add_argument("--tunings", nargs="*", default=TUNINGS, choices=TUNINGS)
     options = parser.parse_args()
     os.chdir(ROOT)
     target = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", "target")) / "release"
@@ -83,6 +85,8 @@ def main():
     rows = []
 
     def judge(tuning, scene, arguments, more=()):
+        if tuning not in options.tunings:
+            return
         answer = run(sapwise, [*arguments, "--repeats", options.repeats, *more])
         part = answer["parts"][-1] if "--after" in more else answer
         rows.append(row(options.host, tuning, scene, answer, part))
@@ -107,12 +111,12 @@ def main():
     kept = []
     if TABLE.exists():
         with TABLE.open(newline="") as file:
-            kept = [r for r in csv.DictReader(file) if r["host"] != options.host]
+            kept = [r for r in csv.DictReader(file) if r["host"] != options.host or r["tuning"] not in options.tunings]
     with TABLE.open("w", newline="") as file:
         table = csv.DictWriter(file, rows[0].keys(), lineterminator="\n")
         table.writeheader()
         table.writerows(kept + rows)
-    for tuning in ["predicted", "measured", "other"]:
+    for tuning in TUNINGS:
         over = [float(r["over_single"]) for r in rows if r["tuning"] == tuning]
         if over:
             mean = math.exp(statistics.fmean(map(math.log, over)))
