@@ -16,9 +16,6 @@ use sapwise::{
 use sapwise_tune::StartOptions;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The method that keeps work from frame to frame: of no use here.
-const INCREMENTAL: &str = "pair-cache";
-
 /// Built-in thresholds, in boxes, for an unknown machine: `grid-sap` replaces `brute` from the first on, and runs on
 /// `k` threads from `k` squared times the second on. Rounded from `uniform` and `clustered` in `datasets/`.
 const GRID_FROM: u32 = 300;
@@ -136,8 +133,7 @@ impl Engine {
     fn new() -> Result<Self, Error> {
         let registry = Arc::new(Registry::new());
         let options = StartOptions::new().background(false).measure(None).registry(Arc::clone(&registry));
-        let mut tuning = sapwise_tune::for_this_machine(&options)?.tuning().clone();
-        tuning.costs.retain(|cost| cost.algorithm.method() != INCREMENTAL);
+        let tuning = sapwise_tune::for_this_machine(&options)?.tuning().clone();
         let is_usual = tuning.costs.is_empty();
         let mut adaptive = Adaptive::new(if is_usual { usual(&registry)? } else { tuning }, &registry)?;
         adaptive.set_exploring(false);

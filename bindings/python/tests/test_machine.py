@@ -25,7 +25,7 @@ def tuning(folder):
 def test_a_prediction_tells_fields_crossovers_and_costs(tuning):
     assert tuning.source == "predicted" and tuning.setup["origin"] == "probed" and tuning.model
     methods = {name.split("@")[0] for name in tuning.algorithms}
-    assert methods >= {"brute", "bvh", "pair-cache"}
+    assert methods >= {"brute", "pair-cache"}
     froms = [at for at, _ in tuning.fields]
     assert froms[0] == 0 and froms == sorted(froms) and len(tuning.crossovers) == len(froms) - 1
     for crossover, (at, name) in zip(tuning.crossovers, tuning.fields[1:]):
@@ -34,8 +34,8 @@ def test_a_prediction_tells_fields_crossovers_and_costs(tuning):
         assert crossover["low"] is None or crossover["low"] <= crossover["objects"] <= crossover["high"]
     costs = tuning.costs(10_000, pairs=5000, axis_candidates=2e6, strip_candidates=1e5)
     assert set(costs) == set(tuning.algorithms) and list(costs.values()) == sorted(costs.values())
-    assert costs["brute@cpu1"] > costs["bvh@cpu1"] > 1e4
-    assert tuning.costs(20, pairs=3)["brute@cpu1"] < tuning.costs(20, pairs=3)["bvh@cpu1"]
+    assert costs["brute@cpu1"] > costs["pair-cache@cpu1"] > 1e4
+    assert tuning.costs(20, pairs=3)["brute@cpu1"] < tuning.costs(20, pairs=3)["pair-cache@cpu1"]
     assert "predicted" in repr(tuning)
 
 
