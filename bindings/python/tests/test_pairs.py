@@ -132,8 +132,7 @@ def test_the_last_decision_tells_what_ran():
     sapwise.pairs(cubes(5000))
     decision = sapwise.last_decision()
     method, _, backend = decision.algorithm.partition("@")
-    # Of work that is kept from frame to frame no single call has any use.
-    assert method in {"brute", "sap", "grid-sap", "bvh"} and backend.startswith("cpu")
+    assert method in {"brute", "grid-sap", "pair-cache"} and backend.startswith("cpu")
     assert decision.source in {"default", "predicted", "learned"} and decision.load["objects"] == 5000
     assert decision.algorithm in str(decision) and decision.reason in repr(decision)
 
