@@ -31,6 +31,28 @@ fn crossovers_lie_where_curves_cross_within_their_intervals() {
     assert_eq!(tuning.step(u32::MAX).unwrap().algorithm.method(), "grid-sap");
 }
 
+#[test]
+fn for_running_gives_the_fields_of_a_tree_to_pair_cache() {
+    let cost =
+        |id: &str, call_ns: f64, unit_ns: f64| cost(id, &[(Term::Call, call_ns), (Term::Objects, unit_ns)], 0.05);
+    let all = |with: &[&str]| {
+        let mut costs = vec![cost("brute@cpu1", 0.0, 100.0), cost("bvh@cpu1", 8000.0, 20.0)];
+        costs.extend([cost("sap@cpu2", 40_000.0, 10.0), cost("bvh@gpu0", 1.0e6, 1.0)]);
+        costs.extend(with.iter().map(|id| cost(id, 1.0e5, 19.0)));
+        Tuning::from_costs(Source::Measured, "uniform", costs, &loads())
+    };
+    let tuning = all(&["pair-cache@cpu1", "pair-cache@cpu2"]).for_running();
+    assert_eq!(tuning.defect(), None);
+    let names: Vec<String> = tuning.steps.iter().map(|s| s.algorithm.to_string()).collect();
+    assert_eq!(names, ["brute@cpu1", "pair-cache@cpu1", "pair-cache@cpu2", "bvh@gpu0"]);
+    let sides = tuning.crossovers.iter().map(|c| [c.below.to_string(), c.above.to_string()]);
+    assert!(sides.eq(names.windows(2).map(|pair| [pair[0].clone(), pair[1].clone()])), "{:?}", tuning.crossovers);
+    assert_eq!(tuning.costs.len(), 4);
+    // What would stand in is missing.
+    let whole = all(&["pair-cache@cpu1"]);
+    assert_eq!(whole.clone().for_running(), whole);
+}
+
 /// Found by the fuzz target `files`: what was written could not be read again.
 #[test]
 fn a_slice_through_no_load_leaves_sound_tuning() {
