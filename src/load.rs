@@ -140,8 +140,8 @@ impl Load {
     }
 }
 
-/// Returns one position of each of `parts` equal parts of `0..count`, at a random place: boxes of a kind may follow each
-/// other at regular distances, and an even spacing could meet all or none of them.
+/// Returns one position of each of `parts` equal parts of `0..count`, at a random place: boxes of a kind may follow
+/// each other at regular distances, and an even spacing could meet all or none of them.
 fn one_of_each(count: usize, parts: usize, seed: u64) -> impl Iterator<Item = usize> {
     let start = move |k: usize| (k as u64 * count as u64 / parts as u64) as usize;
     (0..parts).map(move |k| start(k) + (mix(seed ^ k as u64) % (start(k + 1) - start(k)) as u64) as usize)

@@ -5,7 +5,7 @@
 #   tools/avian.sh long    # the tests with all bodies and 600 steps, optimised: tens of minutes
 #   tools/avian.sh bench   # times both broad phases in turn, into results/avian.csv
 #
-# Bevy 0.20 asks for Rust 1.97.1 but what is used of it builds with 1.95, so cargo is told to ignore what Bevy asks for.
+# Bevy 0.20 declares Rust 1.97.1. The parts used here build with 1.95, so cargo ignores the declared version.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 options=(--manifest-path bindings/avian/Cargo.toml --locked --quiet --ignore-rust-version)

@@ -134,8 +134,7 @@ pub(crate) fn bits(handles: impl IntoIterator<Item = Handle>) -> BigUint64Array 
 
 /// Returns a view of boxes in the memory of this module, valid until that grows or the boxes change their place.
 pub(crate) fn view(boxes: &[Aabb]) -> Float32Array {
-    // SAFETY: an `Aabb` is six floats. The caller of the module is told how long the view is valid; an older one shows
-    // other numbers, which JavaScript may read.
+    // SAFETY: an `Aabb` is six floats. A view that is no longer valid shows other numbers, which JavaScript may read.
     unsafe { Float32Array::view(std::slice::from_raw_parts(boxes.as_ptr().cast(), 6 * boxes.len())) }
 }
 

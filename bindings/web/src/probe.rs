@@ -45,8 +45,8 @@ export interface Progress {
 ";
 
 /// Measures this machine as a page can, within a minute: clock, latency and bandwidth of memory, then every algorithm
-/// over three scenarios. Call `step` until `done` equals `of`; `report` returns what is known so far. It works in a
-/// worker too.
+/// over three scenarios. Call `step` until `done` equals `of`. `report` returns what was measured until then. Works
+/// in a worker, too.
 #[wasm_bindgen]
 pub struct Probe(RefCell<State>);
 

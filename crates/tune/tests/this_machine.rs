@@ -233,7 +233,8 @@ fn a_drop_ends_the_thread() {
     assert_eq!(count(folder.path()), 0);
 }
 
-/// A registry whose `bvh@cpu1` comes from `make`, and takes part: the model does not know this revision of `pair-cache`.
+/// A registry whose `bvh@cpu1` comes from `make`. It takes part, since the model does not know this revision of
+/// `pair-cache`.
 fn with_bvh(make: impl Fn() -> Result<Box<dyn BroadPhase>, Error> + Send + Sync + 'static) -> Arc<Registry> {
     let mut registry = Registry::with_cores(1);
     let tree: AlgorithmId = "bvh@cpu1".parse().unwrap();

@@ -2,8 +2,8 @@
 
 use crate::cpu::mean_time::MeanTime;
 
-/// Frames from scratch before pairs are kept, and the first that counts: one builds the tree, the next may refit it. The
-/// least of those up to the last counts, since one that was interrupted would make keeping look cheap for good.
+/// Frames from scratch before pairs are kept, and the first of them that counts: one builds the tree, the next may
+/// refit it. The least of those that count is taken: an interrupted one would make keeping look cheap for good.
 const FEWEST_FRAMES: u32 = 6;
 const FIRST_COUNTED: u32 = 3;
 
@@ -65,8 +65,8 @@ impl Prices {
         }
     }
 
-    /// Whether keeping is worth a try, by what the model says. The clock ends a try that does not pay; what it has shown
-    /// then counts, less and less, for the next ones.
+    /// Begins a try of keeping if it is worth one by what the model says, and returns whether. The clock ends a try
+    /// that does not pay, whose measured cost counts, less and less, for the next ones.
     pub(super) fn begins(&mut self, keeping: f32, scratch: f32) -> bool {
         let begins = self.over * keeping < scratch && (!self.timed || self.frames >= FEWEST_FRAMES);
         if begins {
@@ -86,7 +86,7 @@ impl Prices {
         self.scratch.get().unwrap_or(1.0) as f32
     }
 
-    /// Keeping did not pay, which costs `model` by the model, or there were too many pairs.
+    /// Ends a try that did not pay, or that had too many pairs to keep. `model`: what the model says of keeping.
     pub(super) fn failed(&mut self, model: f32, too_many: bool) {
         let cost = match self.kept {
             _ if too_many => CROWDED * self.promised[1],
