@@ -232,7 +232,9 @@ impl Tuning {
     /// The tuning with `brute` and `pair-cache` as the only built-in methods on the CPU. `pair-cache` contains `bvh`:
     /// it chooses by its own times between kept pairs and a tree from scratch. Without `sap` and `grid-sap` the best of
     /// the others takes 1.001 to 1.004 times the best of all over the reports of `datasets/` (1.015 at the portable
-    /// SIMD level). `pair-cache` takes their fields. Unchanged unless it has costs of `bvh` on the CPU, and of `pair-cache` on the same numbers of threads.
+    /// SIMD level). `pair-cache` takes their fields.
+    ///
+    /// Unchanged unless it has costs of `bvh` on the CPU, and of `pair-cache` on the same numbers of threads.
     #[must_use]
     pub fn for_running(mut self) -> Self {
         let stand_in = |id: &AlgorithmId| {

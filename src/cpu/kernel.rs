@@ -112,7 +112,10 @@ mod baseline {
 /// the [`Level`] behind its other arguments. In brackets: generic parameters of the kernel before that of the level,
 /// then their names.
 macro_rules! at_level {
-    ($simd:expr, [$($generic:tt)*] [$($name:ident)*] $($kernel:ident)::+ ($($arg:ident: $of:ty),* $(,)?) $(-> $out:ty)?) => {{
+    (
+        $simd:expr, [$($generic:tt)*] [$($name:ident)*]
+        $($kernel:ident)::+ ($($arg:ident: $of:ty),* $(,)?) $(-> $out:ty)?
+    ) => {{
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx512f")]
         fn avx512<$($generic)*>($($arg: $of,)* level: $crate::cpu::level::Avx512) $(-> $out)? {

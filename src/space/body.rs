@@ -19,12 +19,19 @@ pub struct Body {
     user_data: u64,
 }
 
+/// Makes a body that may meet what the membership says.
+impl From<Membership> for Body {
+    fn from(membership: Membership) -> Self {
+        Self { membership, ..Self::default() }
+    }
+}
+
 impl Body {
     /// Makes a body that meets no other fixed or kinematic body. Use it for what rarely moves: walls, the ground. It
     /// may be [set](crate::Space::set) all the same.
     #[must_use]
     pub fn fixed() -> Self {
-        Self { membership: Membership { fixed: true, ..Membership::ALL }, ..Self::default() }
+        Membership { fixed: true, ..Membership::ALL }.into()
     }
 
     /// Makes a body that the program moves along a path, such as a lift. It meets neither fixed bodies nor kinematic

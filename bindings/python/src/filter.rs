@@ -3,7 +3,7 @@
 use crate::error::call;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
-use sapwise::{Body, Membership};
+use sapwise::Membership;
 
 /// What a caller gave for each keyword.
 #[derive(Clone, Copy)]
@@ -63,10 +63,4 @@ impl Columns {
             fixed: self.fixed.as_ref().map_or(of.fixed, |fixed| fixed[k]),
         }
     }
-}
-
-/// Makes the body of a space with this membership.
-pub(crate) fn body(of: Membership) -> Body {
-    let body = if of.fixed { Body::fixed() } else { Body::default() };
-    body.groups(of.groups).masks(of.mask).owner(of.owner)
 }

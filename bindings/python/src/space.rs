@@ -3,7 +3,7 @@
 use crate::boxes::kept;
 use crate::decision::PyDecision;
 use crate::error::{exception, invalid_box, unusable};
-use crate::filter::{Keywords, body};
+use crate::filter::Keywords;
 use crate::handles::{array, bits, check, first_stale, handles, pairs};
 use crate::held::{Held, Searcher};
 use crate::start::{self, Start};
@@ -12,7 +12,7 @@ use crate::view::PyView;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use sapwise::{Aabb, Adaptive, Error, Handle, Membership, Space};
+use sapwise::{Aabb, Adaptive, Body, Error, Handle, Membership, Space};
 use std::sync::{Arc, PoisonError, RwLock, TryLockError};
 
 impl Searcher for Space {
@@ -177,10 +177,10 @@ impl PySpace {
         let boxes = given.as_slice()?;
         let columns = Keywords { groups, masks, owner, fixed }.columns(py, boxes.len())?;
         let inserted = self.change(py, &[], boxes, |space| {
-            let Some(columns) = columns else { return space.insert_all(boxes, body(Membership::ALL)) };
+            let Some(columns) = columns else { return space.insert_all(boxes, Body::default()) };
             Aabb::check(boxes, 0)?;
             space.reserve(boxes.len())?;
-            let of = |k| body(columns.over(k, Membership::ALL));
+            let of = |k| Body::from(columns.over(k, Membership::ALL));
             boxes.iter().enumerate().map(|(k, &aabb)| space.insert(aabb, of(k))).collect()
         })?;
         Ok(array(py, inserted))
@@ -243,7 +243,7 @@ impl PySpace {
             check(space, &handles)?;
             for (k, &handle) in handles.iter().enumerate() {
                 if let Some((_, known)) = space.get(handle) {
-                    let set = body(columns.over(k, *known.membership()));
+                    let set = Body::from(columns.over(k, *known.membership()));
                     space.set_body(handle, set)?;
                 }
             }
@@ -340,7 +340,7 @@ impl PySpace {
     ) -> PyResult<PyView> {
         let columns = Keywords { groups, masks, owner, fixed }.columns(py, 1)?;
         let by = columns.map_or(Membership::ALL, |columns| columns.over(0, Membership::ALL));
-        Ok(PyView { held: Arc::clone(&self.held), by: Some(body(by)) })
+        Ok(PyView { held: Arc::clone(&self.held), by: Some(by.into()) })
     }
 
     /// Decision or None: what was decided for the last update, and why; None before the first.

@@ -3,7 +3,7 @@
 use crate::arrays::{column, flags};
 use crate::fault::error;
 use js_sys::{Object, Reflect};
-use sapwise::{Body, Membership};
+use sapwise::Membership;
 use wasm_bindgen::prelude::*;
 
 #[wasm_bindgen(typescript_custom_section)]
@@ -66,10 +66,4 @@ impl Memberships {
         }
         Ok(Some(all))
     }
-}
-
-/// Makes the body of a space with this membership.
-pub(crate) fn body(of: Membership) -> Body {
-    let body = if of.fixed { Body::fixed() } else { Body::default() };
-    body.groups(of.groups).masks(of.mask).owner(of.owner)
 }

@@ -10,7 +10,7 @@ use crate::tuning::predicted;
 use js_sys::{Date, Reflect};
 use parameters::Parameters;
 use sapwise::Registry;
-use sapwise::algorithm::{Load, SimdLevel};
+use sapwise::algorithm::{Entry, Load, SimdLevel};
 use sapwise::internals::splitmix::mix;
 use sapwise_tune::json::{self, Format};
 use sapwise_tune::{Hardware, Machine};
@@ -142,8 +142,8 @@ impl Probe {
             let isolated = Reflect::get(&js_sys::global(), &"crossOriginIsolated".into());
             let isolated = isolated.is_ok_and(|isolated| isolated.is_truthy());
             let mut remarks = vec![format!(
-                "the clock of the browser ticks every {:.4} ms, and the page is {}cross-origin isolated; a sample is the \
-                 mean of the frames of at least {} ms",
+                "the clock of the browser ticks every {:.4} ms, and the page is {}cross-origin isolated; a sample is \
+                 the mean of the frames of at least {} ms",
                 state.tick_ms,
                 if isolated { "" } else { "not " },
                 state.parameters.least_ms
@@ -152,7 +152,8 @@ impl Probe {
             if state.done() < State::OF {
                 remarks.push(format!("unfinished: {} of {} parts are done", state.done(), State::OF));
             }
-            let algorithms = Registry::new().available().into_iter();
+            let algorithm = |entry: Entry| json!({"id": entry.id, "revision": entry.revision});
+            let algorithms: Vec<_> = Registry::new().available().into_iter().map(algorithm).collect();
             let date: String = Date::new_0().to_iso_string().into();
             let seconds = ((milliseconds() - state.began_ms) / 100.0).ceil() / 10.0;
             let report = json!({
@@ -162,7 +163,7 @@ impl Probe {
                     "seed": SEED, "threads": 1, "simd": null, "optimised": !cfg!(debug_assertions), "seconds": seconds,
                 },
                 "hardware": state.hardware(),
-                "algorithms": algorithms.map(|entry| json!({"id": entry.id, "revision": entry.revision})).collect::<Vec<_>>(),
+                "algorithms": algorithms,
                 "points": state.sweep.points.iter().map(|point| &point.1).collect::<Vec<_>>(),
                 "remarks": remarks,
             });

@@ -3,7 +3,7 @@
 use crate::arrays::{Numbers, bits, handles, object, own_boxes, three};
 use crate::broad_phase::decision;
 use crate::fault::{call, error};
-use crate::memberships::{Memberships, body};
+use crate::memberships::Memberships;
 use crate::tuning::adaptive;
 use js_sys::{BigUint64Array, Float32Array};
 use sapwise::{Body, Error, Handle, Ray, Space};
@@ -74,7 +74,7 @@ impl WebSpace {
             let of = body.map_or(Ok(None), |body| body.read("body", &[], boxes.len()))?;
             let handles = space.insert_all(&boxes, Body::default()).map_err(failure)?;
             for (&handle, of) in handles.iter().zip(of.into_iter().flatten()) {
-                space.set_body(handle, self::body(of)).map_err(failure)?;
+                space.set_body(handle, of.into()).map_err(failure)?;
             }
             Ok(bits(handles))
         })
