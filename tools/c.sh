@@ -25,11 +25,13 @@ mkdir -p "$folder"
 need() {
     local packages=$1
     shift
-    { [ -e /usr/include/bullet/btBulletDynamicsCommon.h ] && type "$@"; } >/dev/null 2>&1 || {
-        apt-get update -q
-        # shellcheck disable=SC2086 # several packages
-        apt-get install -qy --no-install-recommends libbullet-dev $packages
-    }
+    { [ -e /usr/include/bullet/btBulletDynamicsCommon.h ] && type "$@"; } >/dev/null 2>&1 || install "$packages"
+}
+
+install() {
+    apt-get update -q
+    # shellcheck disable=SC2086 # several packages
+    apt-get install -qy --no-install-recommends libbullet-dev $1
 }
 
 # Builds the shared library by cargo alone. dev also knows of freed objects.
@@ -72,6 +74,8 @@ header)
     ;;
 test)
     need "clang valgrind" clang valgrind
+    # Debian packs clang's sanitizers apart, and names their archive by the architecture.
+    [ -e "$(clang -print-file-name="libclang_rt.asan-$(uname -m).a")" ] || install libclang-rt-dev
     cargo fmt --manifest-path $manifest --check
     cargo clippy --quiet --manifest-path $manifest --all-targets --locked -- -D warnings
     cargo test --quiet --manifest-path $manifest --locked
