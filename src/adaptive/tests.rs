@@ -1,4 +1,5 @@
 mod learning;
+mod seeds;
 #[cfg(feature = "serde")]
 mod traces;
 mod warming;

@@ -9,6 +9,9 @@ const IN_ADVANCE: f64 = 8.0;
 const URGENT: f64 = 17.0;
 /// Frames over which the result of a trial is taken to be of use: five seconds of a game.
 const HORIZON: f64 = 300.0;
+/// Frames of the incumbent that a trial is expected to save beyond its price, at least: candidates that cost nearly the
+/// same are left alone. Replays: 1.073 → 1.068, worst 1.31 → 1.21.
+const LEAST_GAIN: f64 = 5.0;
 /// Frames from the beginning of one trial to the next, at least.
 const APART: u64 = 16;
 /// A trial ends early once it has cost its price and this many frames of the incumbent.
@@ -64,7 +67,7 @@ impl Trials {
         let gain_ns = now_ns * HORIZON * expected_gain(ratio_ln, told_ln);
         let affordable = self.debt_ns + price_ns <= IN_ADVANCE * now_ns + gain_ns / URGENT;
         let trial = Trial { candidate, left: frames, left_ns: price_ns + OVERRUN * now_ns };
-        (gain_ns > price_ns && affordable).then_some((trial, gain_ns - price_ns))
+        (gain_ns > price_ns + LEAST_GAIN * now_ns && affordable).then_some((trial, gain_ns - price_ns))
     }
 
     pub(super) fn begin(&mut self, trial: Trial, frame: u64) {
