@@ -10,6 +10,7 @@ pub use crate::gpu_identity::{GpuIdentity, GpuKind};
 pub use crate::load::{SampledBoxes, SceneStats, StripGrid};
 pub use crate::pair::Pair;
 pub use crate::ray::{Ray, RayDefect};
+pub use crate::triad::triad;
 pub use crate::{splitmix, stats};
 #[cfg(feature = "schema")]
 pub use schemars;

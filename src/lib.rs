@@ -73,6 +73,7 @@ mod space;
 pub mod splitmix;
 #[doc(hidden)]
 pub mod stats;
+mod triad;
 pub mod tuning;
 mod worlds;
 

@@ -107,7 +107,7 @@ install)
     installed
     bytes=$(stat -L -c %s "$prefix/lib/libsapwise.so")
     echo "c: the shared library has $bytes bytes"
-    [ "$bytes" -le 2300000 ] || fail "it has more than 2.3 MB"
+    [ "$bytes" -le 2150000 ] || fail "it has more than 2.15 MB"
     for how in cmake meson; do
         rm -rf "${folder:?}/$how"
         if [ $how = cmake ]; then

@@ -1,6 +1,5 @@
 //! Size of the memory, and its bandwidth by the triad of STREAM.
 
-use std::hint::black_box;
 use std::sync::Mutex;
 use std::time::Instant;
 
@@ -10,8 +9,7 @@ use sysinfo::{ProcessRefreshKind, ProcessesToUpdate, System};
 use super::samples::Plan;
 use super::{Options, cache_sizes, filled, missing, pool};
 use crate::hardware::{Parameter, ParameterId};
-#[cfg(target_arch = "x86_64")]
-use sapwise::algorithm::SimdLevel;
+use sapwise::internals::triad;
 
 /// Bytes that STREAM counts for one element of triad: two read, one written, without the line that is fetched before
 /// the write.
@@ -39,7 +37,7 @@ pub(super) fn measure(options: &Options) -> Vec<Parameter> {
         Some(bytes) => Parameter::reported(ParameterId::MemoryBytes, bytes as f64, "sysinfo, with the cgroup's limit"),
         None => Parameter::missing(ParameterId::MemoryBytes, "sysinfo does not report it"),
     };
-    let bandwidths = triad(options).unwrap_or_else(|why| missing(&BANDWIDTHS, &why));
+    let bandwidths = bandwidths(options).unwrap_or_else(|why| missing(&BANDWIDTHS, &why));
     std::iter::once(size).chain(bandwidths).collect()
 }
 
@@ -60,7 +58,7 @@ fn array_bytes(llc: u64, memory: u64, largest: u64) -> u64 {
 }
 
 /// Measures both bandwidths by the triad a = b + s * c of STREAM. Fails if the threads or the memory are refused.
-fn triad(options: &Options) -> Result<Vec<Parameter>, String> {
+fn bandwidths(options: &Options) -> Result<Vec<Parameter>, String> {
     let start = Instant::now();
     let threads = options.usable_cores();
     let bytes = if options.brief {
@@ -122,7 +120,7 @@ impl Arrays {
     fn triad_on_one(&mut self) -> f64 {
         let start = Instant::now();
         for part in &mut self.parts {
-            pass(&mut part.a, &part.b, &part.c);
+            triad(&mut part.a, &part.b, &part.c);
         }
         self.gb_per_s(start)
     }
@@ -143,7 +141,7 @@ impl Arrays {
             for queue in own.iter().chain(others) {
                 // The closure drops the lock before the chunk is worked on.
                 while let Some(((a, b), c)) = queue.lock().ok().and_then(|mut chunks| chunks.next()) {
-                    pass(a, b, c);
+                    triad(a, b, c);
                 }
             }
         });
@@ -155,45 +153,6 @@ impl Arrays {
         let elements: u64 = self.parts.iter().map(|part| part.a.len() as u64).sum();
         (elements * BYTES_PER_ELEMENT) as f64 / start.elapsed().as_nanos() as f64
     }
-}
-
-/// One pass of a = b + s * c with the widest vectors in use.
-///
-/// x86-64 defaults to 128-bit vectors: with them one thread reached 0.90 of the bandwidth of a C program that was
-/// compiled for the machine, and 1.02 of it with 512-bit ones.
-fn pass(a: &mut [f64], b: &[f64], c: &[f64]) {
-    #[cfg(target_arch = "x86_64")]
-    match SimdLevel::in_use() {
-        // SAFETY: the level in use is one that the CPU was detected to have.
-        SimdLevel::Avx512 => return unsafe { pass_avx512(a, b, c) },
-        // SAFETY: the same.
-        SimdLevel::Avx2 => return unsafe { pass_avx2(a, b, c) },
-        _ => {}
-    }
-    pass_portable(a, b, c);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f")]
-fn pass_avx512(a: &mut [f64], b: &[f64], c: &[f64]) {
-    pass_portable(a, b, c);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn pass_avx2(a: &mut [f64], b: &[f64], c: &[f64]) {
-    pass_portable(a, b, c);
-}
-
-/// Always inlined, so that it is compiled for the vectors of its caller.
-#[inline(always)]
-fn pass_portable(a: &mut [f64], b: &[f64], c: &[f64]) {
-    let scalar = black_box(3.0);
-    // Indices would leave bounds checks in the loop, which would not be vectorised.
-    for ((a, b), c) in a.iter_mut().zip(b).zip(c) {
-        *a = b + scalar * c;
-    }
-    black_box(a);
 }
 
 #[cfg(test)]
