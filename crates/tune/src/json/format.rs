@@ -161,13 +161,8 @@ impl Format {
     /// # Errors
     /// [`Error::Write`] when a value is not finite.
     pub fn write<T: Serialize>(&self, value: &T) -> Result<String, Error> {
-        #[derive(Serialize)]
-        struct Tagged<'a, T> {
-            schema: String,
-            #[serde(flatten)]
-            value: &'a T,
-        }
-        super::write(&Tagged { schema: self.schema().to_string(), value })
+        let schema = format!("{{\n  \"schema\": \"{}\",", self.schema());
+        Ok(super::write(value)?.replacen('{', &schema, 1))
     }
 
     /// Returns file name and text of the JSON Schema of files that hold a `T`.
