@@ -262,6 +262,7 @@ impl Space {
     ///
     /// # Panics
     /// If there are not as many boxes as handles.
+    #[inline(never)]
     pub fn set_all(&mut self, handles: &[Handle], boxes: &[Aabb]) -> Result<(), Error> {
         assert_eq!(handles.len(), boxes.len(), "one box for each handle");
         handles.iter().zip(boxes).try_for_each(|(&handle, aabb)| self.check(handle, aabb).map(drop))?;

@@ -14,16 +14,17 @@ pub(crate) unsafe fn slice<'a, T>(first: *const T, n: usize, what: &str) -> Resu
 }
 
 /// Returns an error if there can't be `n` elements at `first`.
+#[inline]
 pub(crate) fn check<T>(first: *const T, n: usize, what: &str) -> Result<(), Failure> {
     if n == 0 {
         Ok(())
     } else if first.is_null() {
         Err(Failure::null(what))
     } else if !first.is_aligned() {
-        let text = format!("{what} is at {first:p}; align it to {} bytes", align_of::<T>());
+        let text = format_args!("{what} is at {first:p}; align it to {} bytes", align_of::<T>());
         Err(Failure::new(SW_INVALID_ARGUMENT, text))
     } else if u32::try_from(n).is_err() || n.checked_mul(size_of::<T>()).is_none_or(|size| size > isize::MAX as usize) {
-        Err(Failure::new(SW_TOO_MANY, format!("{what} has {n} elements; 32 bits must number them")))
+        Err(Failure::new(SW_TOO_MANY, format_args!("{what} has {n} elements; 32 bits must number them")))
     } else {
         Ok(())
     }
@@ -54,9 +55,7 @@ pub(crate) fn handle(bits: u64) -> Result<Handle, Failure> {
 pub(crate) unsafe fn handles<'a>(first: *const u64, n: usize) -> Result<&'a [Handle], Failure> {
     // SAFETY: of the caller.
     let bits = unsafe { slice(first, n, "handles") }?;
-    // A generation is not 0. Without a branch for each, so that several are looked at together.
-    let suspicious = bits.iter().fold(false, |any, &bits| any | (bits as u32 == 0));
-    if suspicious && bits.contains(&0) {
+    if bits.contains(&0) {
         handle(0)?;
     }
     // SAFETY: a handle is a `NonZeroU64` without more, and none of the numbers is 0.

@@ -33,7 +33,7 @@ impl sw_body {
             SW_FIXED => Body::fixed(),
             SW_KINEMATIC => Body::kinematic(),
             kind => {
-                let text = format!("the kind of the body is {kind}; use SW_MOVING, SW_FIXED or SW_KINEMATIC");
+                let text = format_args!("the kind of the body is {kind}; use SW_MOVING, SW_FIXED or SW_KINEMATIC");
                 return Err(Failure::new(SW_INVALID_ARGUMENT, text));
             }
         };

@@ -45,17 +45,22 @@ pub(crate) struct Boxes<'a> {
 impl<'a> Boxes<'a> {
     /// # Safety
     /// `min`, `n`, `stride` and `max` describe memory as the head of the header says, or can be told to be wrong.
+    #[inline]
     pub(crate) unsafe fn new(min: *const f32, n: usize, stride: usize, max: *const f32) -> Result<Self, Failure> {
         let least = if max.is_null() { size_of::<Aabb>() } else { size_of::<Corner>() };
         let stride = if stride == 0 { least } else { stride };
         if stride < least || !stride.is_multiple_of(align_of::<f32>()) {
-            let text = format!("the stride of boxes is {stride} bytes; use a multiple of 4, at least {least}, or 0");
+            let text =
+                format_args!("the stride of boxes is {stride} bytes; use a multiple of 4, at least {least}, or 0");
             return Err(Failure::new(SW_INVALID_ARGUMENT, text));
         }
         check(min, n, "boxes")?;
         check(max, if max.is_null() { 0 } else { n }, "max")?;
         if n.checked_mul(stride).is_none_or(|size| size > isize::MAX as usize) {
-            return Err(Failure::new(SW_TOO_MANY, format!("{n} boxes with a stride of {stride} bytes fit no memory")));
+            return Err(Failure::new(
+                SW_TOO_MANY,
+                format_args!("{n} boxes with a stride of {stride} bytes fit no memory"),
+            ));
         }
         // The three floats behind the minimum, or nothing at all.
         let max = if max.is_null() { min.wrapping_add(3) } else { max };

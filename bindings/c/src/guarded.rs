@@ -116,12 +116,14 @@ mod remains {
 #[cold]
 fn refused(what: &str, users: u32) -> Failure {
     match users {
-        BROKEN => Failure::new(SW_PANIC, format!("a call with this {what} has failed in the middle; free it")),
-        FREED => Failure::new(SW_FREED, format!("this {what} was freed; set pointers to NULL after freeing")),
-        CHANGING => Failure::new(SW_BUSY, format!("another thread changes this {what}; call after it")),
+        BROKEN => Failure::new(SW_PANIC, format_args!("a call with this {what} has failed in the middle; free it")),
+        FREED => Failure::new(SW_FREED, format_args!("this {what} was freed; set pointers to NULL after freeing")),
+        CHANGING => Failure::new(SW_BUSY, format_args!("another thread changes this {what}; call after it")),
         _ => Failure::new(
             SW_BUSY,
-            format!("a query of this {what} runs; change it after the query, not in a callback or on another thread"),
+            format_args!(
+                "a query of this {what} runs; change it after the query, not in a callback or on another thread"
+            ),
         ),
     }
 }

@@ -329,7 +329,7 @@ pub unsafe extern "C-unwind" fn sw_space_get(
 pub unsafe extern "C-unwind" fn sw_space_handles(space: *const sw_space, handles: *mut u64, n: usize) -> sw_status {
     let write = |space: &Space| {
         if space.len() > n {
-            let text = format!("there are {} bodies; give room for as many handles, not {n}", space.len());
+            let text = format_args!("there are {} bodies; give room for as many handles, not {n}", space.len());
             return Err(Failure::new(sw_status::SW_INVALID_ARGUMENT, text));
         }
         check(handles, space.len(), "handles")?;

@@ -4,6 +4,7 @@ use sapwise::Error;
 use sapwise::error::Unavailable;
 use std::cell::RefCell;
 use std::ffi::{CString, c_char};
+use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// What a function returns. 0 is success. After any other value, sw_last_error has the message.
@@ -49,12 +50,14 @@ pub(crate) struct Failure {
 }
 
 impl Failure {
-    pub(crate) fn new(status: sw_status, text: impl Into<String>) -> Self {
-        Self { status, text: text.into() }
+    #[cold]
+    pub(crate) fn new(status: sw_status, text: impl fmt::Display) -> Self {
+        Self { status, text: text.to_string() }
     }
 
+    #[cold]
     pub(crate) fn null(what: &str) -> Self {
-        Self::new(SW_NULL, format!("{what} is NULL"))
+        Self::new(SW_NULL, format_args!("{what} is NULL"))
     }
 }
 
@@ -104,7 +107,7 @@ pub(crate) fn call(run: impl FnOnce() -> Result<(), Failure>) -> sw_status {
         Err(panic) => {
             let text = panic.downcast_ref::<String>().map(String::as_str);
             let text = text.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
-            report(Failure::new(SW_PANIC, format!("a fault of Sapwise, please report it: {text}")))
+            report(Failure::new(SW_PANIC, format_args!("a fault of Sapwise, please report it: {text}")))
         }
     }
 }

@@ -16,7 +16,7 @@ pub(crate) unsafe fn read<'a>(text: *const c_char, what: &str) -> Result<Option<
     }
     // SAFETY: of the caller.
     let text = unsafe { CStr::from_ptr(text) };
-    text.to_str().map(Some).map_err(|_| Failure::new(SW_INVALID_ARGUMENT, format!("{what} is not UTF-8")))
+    text.to_str().map(Some).map_err(|_| Failure::new(SW_INVALID_ARGUMENT, format_args!("{what} is not UTF-8")))
 }
 
 /// Writes as much of a text as fits, with a zero at the end. Returns the length of the whole.
