@@ -111,7 +111,7 @@ fn queries_leave_out_what_was_removed_since_and_report_bad_input() {
     space.update().unwrap();
     let at = |space: &Space| {
         let mut found = Vec::new();
-        space.query_point([0.5; 3], |handle| found.push(handle)).unwrap();
+        space.all().query_point([0.5; 3], |handle| found.push(handle)).unwrap();
         found
     };
     assert_eq!(at(&space), handles);
@@ -122,20 +122,19 @@ fn queries_leave_out_what_was_removed_since_and_report_bad_input() {
     space.update().unwrap();
     assert_eq!(at(&space), []);
     let nan = [f32::NAN, 0.0, 0.0];
-    assert!(matches!(space.nearest(nan, 1), Err(Error::InvalidRay { .. })));
-    assert!(matches!(space.query_point(nan, drop), Err(Error::InvalidBox { index: 0, .. })));
-    assert!(matches!(space.first_hit(&Ray::new([0.0; 3], [0.0; 3])), Err(Error::InvalidRay { .. })));
+    assert!(matches!(space.all().nearest(nan, 1), Err(Error::InvalidRay { .. })));
+    assert!(matches!(space.all().query_point(nan, drop), Err(Error::InvalidBox { index: 0, .. })));
+    assert!(matches!(space.all().first_hit(&Ray::new([0.0; 3], [0.0; 3])), Err(Error::InvalidRay { .. })));
     let unit = Aabb::cube([9.0; 3], 0.5);
-    assert!(matches!(space.cast_box(&unit, nan, |_, t| t), Err(Error::InvalidRay { .. })));
+    assert!(matches!(space.all().cast_box(&unit, nan, |_, t| t), Err(Error::InvalidRay { .. })));
     let mut met = 0;
-    space
-        .cast_box(&unit, [0.0; 3], |_, t| {
-            met += 1;
-            t
-        })
-        .unwrap();
+    let count = |_, t| {
+        met += 1;
+        t
+    };
+    space.all().cast_box(&unit, [0.0; 3], count).unwrap();
     assert_eq!(met, 1);
-    assert_eq!(Space::new().nearest([0.0; 3], 3), Ok(vec![]));
+    assert_eq!(Space::new().all().nearest([0.0; 3], 3), Ok(vec![]));
 }
 
 #[test]
@@ -149,8 +148,8 @@ fn clones_see_resting_bodies_at_the_last_update() {
         space.set(handles[7], Aabb::cube([x, 0.0, 0.0], 0.4)).unwrap();
     }
     for space in [space.clone(), space] {
-        assert_eq!(space.nearest([7.0, 0.0, 0.0], 1), Ok(vec![(handles[7], 0.0)]));
-        assert_eq!(space.nearest([300.0, 0.0, 0.0], 1).unwrap()[0].0, handles[99]);
+        assert_eq!(space.all().nearest([7.0, 0.0, 0.0], 1), Ok(vec![(handles[7], 0.0)]));
+        assert_eq!(space.all().nearest([300.0, 0.0, 0.0], 1).unwrap()[0].0, handles[99]);
     }
 }
 
@@ -163,9 +162,9 @@ fn lowest_handle_is_the_nearest_of_equals() {
     space.update().unwrap();
     space.remove(handles[0]).unwrap();
     space.update().unwrap();
-    assert_eq!(space.nearest([5.0, 0.0, 0.0], 1), Ok(vec![(handles[1], 4.0)]));
+    assert_eq!(space.all().nearest([5.0, 0.0, 0.0], 1), Ok(vec![(handles[1], 4.0)]));
     let ray = Ray::new([5.0, 0.0, 0.0], [-1.0, 0.0, 0.0]);
-    assert_eq!(space.first_hit(&ray), Ok(Some((handles[1], 4.0))));
+    assert_eq!(space.all().first_hit(&ray), Ok(Some((handles[1], 4.0))));
 }
 
 #[test]
@@ -180,7 +179,7 @@ fn threads_may_query_at_once() {
             scope.spawn(move || {
                 for k in (start..500).step_by(4) {
                     let ray = Ray::new([k as f32, 5.0, 0.0], [0.0, -1.0, 0.0]);
-                    assert_eq!(space.first_hit(&ray), Ok(Some((handles[k], 4.6))));
+                    assert_eq!(space.all().first_hit(&ray), Ok(Some((handles[k], 4.6))));
                 }
             });
         }

@@ -24,69 +24,13 @@ impl Space {
     /// Returns a view of the bodies that `body` may meet.
     #[must_use]
     pub fn view(&self, body: &Body) -> View<'_> {
-        View::of(self, Some(body))
+        View { space: self, by: Some(body.membership) }
     }
 
     /// Returns a view of all bodies.
     #[must_use]
     pub fn all(&self) -> View<'_> {
-        View::of(self, None)
-    }
-
-    /// Calls [`View::query_box`] for all bodies.
-    ///
-    /// # Errors
-    /// As there.
-    pub fn query_box(&self, bounds: &Aabb, found: impl FnMut(Handle)) -> Result<(), Error> {
-        self.all().query_box(bounds, found)
-    }
-
-    /// Calls [`View::query_boxes`] for all bodies.
-    ///
-    /// # Errors
-    /// As there.
-    pub fn query_boxes(&self, bounds: &[Aabb], found: impl FnMut(usize, Handle)) -> Result<(), Error> {
-        self.all().query_boxes(bounds, found)
-    }
-
-    /// Calls [`View::query_point`] for all bodies.
-    ///
-    /// # Errors
-    /// As there.
-    pub fn query_point(&self, point: [f32; 3], found: impl FnMut(Handle)) -> Result<(), Error> {
-        self.all().query_point(point, found)
-    }
-
-    /// Calls [`View::cast_ray`] for all bodies.
-    ///
-    /// # Errors
-    /// As there.
-    pub fn cast_ray(&self, ray: &Ray, found: impl FnMut(Handle, f32) -> f32) -> Result<(), Error> {
-        self.all().cast_ray(ray, found)
-    }
-
-    /// Calls [`View::first_hit`] for all bodies.
-    ///
-    /// # Errors
-    /// As there.
-    pub fn first_hit(&self, ray: &Ray) -> Result<Option<(Handle, f32)>, Error> {
-        self.all().first_hit(ray)
-    }
-
-    /// Calls [`View::cast_box`] for all bodies.
-    ///
-    /// # Errors
-    /// As there.
-    pub fn cast_box(&self, aabb: &Aabb, motion: [f32; 3], found: impl FnMut(Handle, f32) -> f32) -> Result<(), Error> {
-        self.all().cast_box(aabb, motion, found)
-    }
-
-    /// Calls [`View::nearest`] for all bodies.
-    ///
-    /// # Errors
-    /// As there.
-    pub fn nearest(&self, point: [f32; 3], k: usize) -> Result<Vec<(Handle, f32)>, Error> {
-        self.all().nearest(point, k)
+        View { space: self, by: None }
     }
 
     /// Returns the trees of all bodies, each with the slot of each id; `None` if ids are slots.
@@ -107,11 +51,7 @@ fn check(ray: &Ray) -> Result<(), Error> {
     ray.defect().map_or(Ok(()), |defect| Err(Error::InvalidRay { defect }))
 }
 
-impl<'a> View<'a> {
-    pub(super) fn of(space: &'a Space, by: Option<&Body>) -> Self {
-        Self { space, by: by.map(|body| body.membership) }
-    }
-
+impl View<'_> {
     /// Returns the handle of a body that is wanted and still there.
     #[inline]
     fn wanted(&self, slots_of_ids: Option<&[u32]>, id: u32) -> Option<Handle> {

@@ -359,14 +359,7 @@ impl Run<'_> {
 
 /// Compares queries with a loop over `all` bodies that they may find.
 fn check_queries(space: &Space, by: Option<&Body>, all: &[(Handle, Aabb)], regions: &[Aabb], ray: &Ray, k: usize) {
-    macro_rules! ask {
-        ($query:ident($($arguments:expr),*)) => {
-            match by {
-                None => space.$query($($arguments),*),
-                Some(by) => space.view(by).$query($($arguments),*),
-            }
-        };
-    }
+    let view = by.map_or_else(|| space.all(), |by| space.view(by));
     let overlapping = |region: &Aabb| -> Vec<Handle> {
         all.iter().filter(|(_, b)| overlap(b, region)).map(|&(handle, _)| handle).collect()
     };
@@ -377,13 +370,13 @@ fn check_queries(space: &Space, by: Option<&Body>, all: &[(Handle, Aabb)], regio
         assert_eq!(result, right);
     };
     let mut found = Vec::new();
-    let result = ask!(query_box(&regions[0], |handle| found.push(handle)));
+    let result = view.query_box(&regions[0], |handle| found.push(handle));
     check_overlapping(found, result, &regions[0]);
     let mut found = Vec::new();
-    let result = ask!(query_point(ray.origin, |handle| found.push(handle)));
+    let result = view.query_point(ray.origin, |handle| found.push(handle));
     check_overlapping(found, result, &Aabb::new(ray.origin, ray.origin));
     let mut found = vec![Vec::new(); regions.len()];
-    let result = ask!(query_boxes(regions, |at, handle| found[at].push(handle)));
+    let result = view.query_boxes(regions, |at, handle| found[at].push(handle));
     assert_eq!(result, check_boxes(regions));
     if result.is_ok() {
         found.into_iter().zip(regions).for_each(|(found, region)| check_overlapping(found, Ok(()), region));
@@ -411,18 +404,18 @@ fn check_queries(space: &Space, by: Option<&Body>, all: &[(Handle, Aabb)], regio
     for &(handle, t) in right.iter().flatten() {
         first = first.filter(|&(_, least)| least <= t).or(Some((handle, t)));
     }
-    assert_eq!(ask!(first_hit(ray)), right.as_ref().map(|_| first).map_err(Error::clone), "{ray:?}");
+    assert_eq!(view.first_hit(ray), right.as_ref().map(|_| first).map_err(Error::clone), "{ray:?}");
     let mut one = 0;
-    let _ = ask!(cast_ray(ray, |_, _| {
+    let _ = view.cast_ray(ray, |_, _| {
         one += 1;
         -1.0
-    }));
+    });
     assert_eq!(one, usize::from(first.is_some()));
     let mut found = Vec::new();
-    let result = ask!(cast_ray(ray, |handle, t| {
+    let result = view.cast_ray(ray, |handle, t| {
         found.push((handle, t));
         INF
-    }));
+    });
     check_hits(found, result, right);
 
     let mut right = check_boxes(&regions[..1]);
@@ -430,10 +423,10 @@ fn check_queries(space: &Space, by: Option<&Body>, all: &[(Handle, Aabb)], regio
         right = Err(Error::InvalidRay { defect: RayDefect::NotFinite });
     }
     let mut found = Vec::new();
-    let result = ask!(cast_box(&regions[0], ray.direction, |handle, t| {
+    let result = view.cast_box(&regions[0], ray.direction, |handle, t| {
         found.push((handle, t));
         INF
-    }));
+    });
     check_hits(found, result, right.map(|()| hits(&regions[0], 1.0)));
 
     let mut near: Vec<(Handle, f32)> = all.iter().map(|(handle, b)| (*handle, distance(ray.origin, b))).collect();
@@ -441,5 +434,5 @@ fn check_queries(space: &Space, by: Option<&Body>, all: &[(Handle, Aabb)], regio
     near.truncate(k);
     let finite = !not_finite(&ray.origin);
     let right = if finite { Ok(near) } else { Err(Error::InvalidRay { defect: RayDefect::NotFinite }) };
-    assert_eq!(ask!(nearest(ray.origin, k)), right, "{:?}", ray.origin);
+    assert_eq!(view.nearest(ray.origin, k), right, "{:?}", ray.origin);
 }

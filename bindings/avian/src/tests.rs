@@ -186,7 +186,7 @@ fn sleeping_bodies_cost_no_update_and_wake() {
         app.world_mut().resource_mut::<BroadPhase>().mirror.space.insert(far, sapwise::Body::default()).unwrap();
         let found = |app: &App| {
             let mut found = 0;
-            app.world().resource::<BroadPhase>().mirror.space.query_box(&far, |_| found += 1).unwrap();
+            app.world().resource::<BroadPhase>().mirror.space.all().query_box(&far, |_| found += 1).unwrap();
             found
         };
         steps(&mut app, 10);

@@ -7,7 +7,7 @@ use crate::held::Held;
 use crate::start;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
-use sapwise::{Aabb, Body, Error, Handle, Ray, Space};
+use sapwise::{Aabb, Body, Error, Handle, Ray, Space, View};
 use std::sync::Arc;
 
 /// The bodies of a ``Space`` that one body may meet, for queries. ``Space.view`` makes it.
@@ -81,24 +81,17 @@ fn point(given: &Bound<'_, PyAny>, name: &str) -> PyResult<[f32; 3]> {
 }
 
 impl PyView {
-    /// Runs a query, without the interpreter's lock, on the space and what the view is by.
-    fn query<T: Send>(
-        &self,
-        py: Python<'_>,
-        query: impl FnOnce(&Space, Option<&Body>) -> Result<T, Error> + Send,
-    ) -> PyResult<T> {
-        self.held.read(py, |space| query(space, self.by.as_ref()))?.map_err(|error| exception(py, &error, ""))
+    /// Runs a query without the interpreter's lock.
+    fn query<T: Send>(&self, py: Python<'_>, query: impl FnOnce(View<'_>) -> Result<T, Error> + Send) -> PyResult<T> {
+        let run = |space: &Space| query(self.by.as_ref().map_or_else(|| space.all(), |by| space.view(by)));
+        self.held.read(py, run)?.map_err(|error| exception(py, &error, ""))
     }
 
     /// Returns the position of each box with each body that it overlaps, sorted.
     fn overlapping(&self, py: Python<'_>, boxes: &[Aabb]) -> PyResult<Vec<(usize, Handle)>> {
-        self.query(py, |space, by| {
+        self.query(py, |view| {
             let mut all = Vec::new();
-            let found = |k, handle| all.push((k, handle));
-            match by {
-                None => space.query_boxes(boxes, found),
-                Some(by) => space.view(by).query_boxes(boxes, found),
-            }?;
+            view.query_boxes(boxes, |k, handle| all.push((k, handle)))?;
             all.sort_unstable();
             Ok(all)
         })
@@ -106,18 +99,14 @@ impl PyView {
 
     /// Returns the hits of each ray with its position, sorted.
     fn hits(&self, py: Python<'_>, rays: &[Ray]) -> PyResult<Vec<(usize, Hit)>> {
-        self.query(py, |space, by| {
+        self.query(py, |view| {
             let mut all = Vec::new();
             for (k, ray) in rays.iter().enumerate() {
                 let mut hits = Vec::new();
-                let found = |handle, t| {
+                view.cast_ray(ray, |handle, t| {
                     hits.push((t, handle));
                     f32::INFINITY
-                };
-                match by {
-                    None => space.cast_ray(ray, found),
-                    Some(by) => space.view(by).cast_ray(ray, found),
-                }?;
+                })?;
                 all.extend(sorted(hits).into_iter().map(|hit| (k, hit)));
             }
             Ok(all)
@@ -257,10 +246,8 @@ impl PyView {
     ) -> PyResult<Hits<'py>> {
         let py = origins.py();
         let rays = rays(origins, directions, max, false)?;
-        let first = self.query(py, |space, by| {
-            let hit = |ray| by.map_or_else(|| space.first_hit(ray), |by| space.view(by).first_hit(ray));
-            rays.iter().map(hit).collect::<Result<Vec<_>, Error>>()
-        })?;
+        let first =
+            self.query(py, |view| rays.iter().map(|ray| view.first_hit(ray)).collect::<Result<Vec<_>, Error>>())?;
         let handles: Vec<u64> = first.iter().map(|hit| hit.map_or(0, |(handle, _)| handle.to_bits())).collect();
         let t: Vec<f32> = first.iter().map(|hit| hit.map_or(f32::INFINITY, |(_, t)| t)).collect();
         Ok((handles.into_pyarray(py), t.into_pyarray(py)))
@@ -282,16 +269,12 @@ impl PyView {
     fn cast_box<'py>(&self, r#box: &Bound<'py, PyAny>, motion: &Bound<'py, PyAny>) -> PyResult<Hits<'py>> {
         let py = r#box.py();
         let (aabb, motion) = (one(r#box)?, point(motion, "motion")?);
-        let hits = self.query(py, |space, by| {
+        let hits = self.query(py, |view| {
             let mut all = Vec::new();
-            let found = |handle, share| {
+            view.cast_box(&aabb, motion, |handle, share| {
                 all.push((share, handle));
                 f32::INFINITY
-            };
-            match by {
-                None => space.cast_box(&aabb, motion, found),
-                Some(by) => space.view(by).cast_box(&aabb, motion, found),
-            }?;
+            })?;
             Ok(sorted(all))
         })?;
         Ok(apart(py, hits.into_iter()))
@@ -317,10 +300,7 @@ impl PyView {
         #[pyo3(from_py_with = start::k)] k: usize,
     ) -> PyResult<Hits<'py>> {
         let at = self::point(point, "point")?;
-        let near = self.query(point.py(), |space, by| {
-            let k = k.min(space.len());
-            by.map_or_else(|| space.nearest(at, k), |by| space.view(by).nearest(at, k))
-        })?;
+        let near = self.query(point.py(), |view| view.nearest(at, k))?;
         Ok(apart(point.py(), near.into_iter().map(|(handle, distance)| (distance, handle))))
     }
 }

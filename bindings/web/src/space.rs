@@ -130,7 +130,7 @@ impl WebSpace {
         call(|| {
             let boxes = own_boxes(bounds)?;
             let [bounds] = boxes[..] else { return error(format!("{} boxes; give one", boxes.len())) };
-            self.found(|space, found| space.query_box(&bounds, found))
+            self.found(|space, found| space.all().query_box(&bounds, found))
         })
     }
 
@@ -139,7 +139,7 @@ impl WebSpace {
     pub fn query_point(&self, point: &Numbers) -> Result<BigUint64Array, JsError> {
         call(|| {
             let point = three(point, "point")?;
-            self.found(|space, found| space.query_point(point, found))
+            self.found(|space, found| space.all().query_point(point, found))
         })
     }
 
@@ -151,7 +151,7 @@ impl WebSpace {
             let ray = Ray::new(three(origin, "origin")?, three(direction, "direction")?);
             let ray = Ray { max: max.unwrap_or(f32::INFINITY), ..ray };
             let mut found = Vec::new();
-            self.0.borrow().cast_ray(&ray, |handle, t| {
+            self.0.borrow().all().cast_ray(&ray, |handle, t| {
                 found.push((handle, t));
                 f32::INFINITY
             })?;
@@ -163,7 +163,7 @@ impl WebSpace {
     /// Returns the `count` bodies whose boxes are nearest to a point.
     #[wasm_bindgen(unchecked_return_type = "Hits")]
     pub fn nearest(&self, point: &Numbers, count: usize) -> Result<JsValue, JsError> {
-        call(|| Ok(hits(&self.0.borrow().nearest(three(point, "point")?, count)?)))
+        call(|| Ok(hits(&self.0.borrow().all().nearest(three(point, "point")?, count)?)))
     }
 
     /// Returns which algorithm searched in the last update, and why; undefined before the first.
