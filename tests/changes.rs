@@ -87,27 +87,6 @@ proptest! {
     }
 
     #[test]
-    fn changes_follow_added_and_removed_boxes(
-        seed in 1_u64..u64::MAX,
-        frames in prop::collection::vec((0_usize..60, 0_usize..40), 1..12),
-    ) {
-        let registry = Registry::with_cores(1);
-        let mut algorithm = registry.create(&"pair-cache@cpu1".parse().unwrap()).unwrap();
-        let mut world = World::new(seed);
-        let mut changes = Changes::new();
-        let mut before = BTreeSet::new();
-        let mut pairs = Pairs::new();
-        for (frame, &(come, go)) in frames.iter().enumerate() {
-            world.frame(come, go);
-            algorithm.find_pairs(&world.boxes, &mut pairs).unwrap();
-            changes.update(&pairs, &world.ids).unwrap();
-            let now = by_ids(&naive(&world.boxes), &world.ids);
-            assert_changes(&changes, &now, &before, &format!("frame {frame}"));
-            before = now;
-        }
-    }
-
-    #[test]
     fn missing_ids_are_an_error_and_change_nothing(short in 0_usize..50, seed in 1_u64..u64::MAX) {
         let mut world = World::new(seed);
         world.frame(50, 0);

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Random, every_algorithm, naive, naive_filtered};
+use common::{Random, assert_each_finds, every_algorithm, naive, naive_filtered};
 use sapwise::{Aabb, BroadPhase, Error, Filter, Membership, PairOrder, Pairs, Registry};
 use sapwise_scenes::Scenario;
 
@@ -61,10 +61,7 @@ fn fixed_ground_has_no_pair_with_itself() {
     for frame in 0..40 {
         let expected = naive_filtered(scene.boxes(), &memberships);
         assert!((30..400).contains(&expected.len()), "{}", expected.len());
-        for (id, algorithm) in &mut algorithms {
-            algorithm.find_pairs(scene.boxes(), &mut pairs).unwrap();
-            assert!(pairs.as_slice() == expected, "{id}, frame {frame}");
-        }
+        assert_each_finds(&expected, &mut algorithms, scene.boxes(), &mut pairs, &format!("frame {frame}"));
         scene.advance();
     }
 }
@@ -93,18 +90,12 @@ fn memberships_change_while_pairs_are_kept() {
         if frame % 20 == 10 {
             let filter = pairs.filter().cloned();
             pairs.set_filter(None);
-            for (id, algorithm) in &mut algorithms {
-                algorithm.find_pairs(&boxes, &mut pairs).unwrap();
-                assert!(pairs.as_slice() == naive(&boxes), "{id}, frame {frame}, without a filter");
-            }
+            assert_each_finds(&naive(&boxes), &mut algorithms, &boxes, &mut pairs, "without a filter");
             pairs.set_filter(filter);
         }
         let expected = naive_filtered(&boxes, &pairs.filter().unwrap().memberships);
         assert!(!expected.is_empty() && expected.len() < naive(&boxes).len());
-        for (id, algorithm) in &mut algorithms {
-            algorithm.find_pairs(&boxes, &mut pairs).unwrap();
-            assert!(pairs.as_slice() == expected, "{id}, frame {frame}: {} pairs, not {}", pairs.len(), expected.len());
-        }
+        assert_each_finds(&expected, &mut algorithms, &boxes, &mut pairs, &format!("frame {frame}"));
     }
 }
 
@@ -126,10 +117,8 @@ fn fixed_boxes_are_freed_while_pairs_are_kept() {
         pairs.set_filter((!memberships.is_empty()).then(|| Filter::new(memberships.clone())));
         let expected = naive_filtered(&boxes, &memberships);
         for frame in 0..6 {
-            for (id, algorithm) in &mut algorithms {
-                algorithm.find_pairs(&boxes, &mut pairs).unwrap();
-                assert!(pairs.as_slice() == expected, "{id}, stage {stage}, frame {frame}: {} pairs", pairs.len());
-            }
+            let what = format!("stage {stage}, frame {frame}");
+            assert_each_finds(&expected, &mut algorithms, &boxes, &mut pairs, &what);
         }
     }
 }
@@ -157,10 +146,7 @@ fn few_memberships_change_while_nothing_moves() {
             pairs.filter_mut().unwrap().memberships[(random.next() * 1449.0) as usize] = kind;
         }
         let expected = naive_filtered(&boxes, &pairs.filter().unwrap().memberships);
-        for (id, algorithm) in &mut algorithms {
-            algorithm.find_pairs(&boxes, &mut pairs).unwrap();
-            assert!(pairs.as_slice() == expected, "{id}, frame {frame}: {} pairs, not {}", pairs.len(), expected.len());
-        }
+        assert_each_finds(&expected, &mut algorithms, &boxes, &mut pairs, &format!("frame {frame}"));
     }
 }
 

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Random, naive, registries};
+use common::{Random, assert_each_finds, naive, registries};
 use sapwise::{Aabb, BroadPhase, Error, PairOrder, Pairs, Registry};
 
 /// Returns every method on one and on three threads at every SIMD level of this machine.
@@ -33,12 +33,7 @@ impl BroadPhase for Roaming {
 }
 
 fn assert_all_agree(event: &str, boxes: &[Aabb], algorithms: &mut [(String, Box<dyn BroadPhase>)]) {
-    let expected = naive(boxes);
-    let mut pairs = Pairs::with_order(PairOrder::Canonical);
-    for (id, algorithm) in algorithms {
-        algorithm.find_pairs(boxes, &mut pairs).unwrap();
-        assert!(pairs.as_slice() == expected, "{id}, {event}: {} pairs, not {}", pairs.len(), expected.len());
-    }
+    assert_each_finds(&naive(boxes), algorithms, boxes, &mut Pairs::with_order(PairOrder::Canonical), event);
 }
 
 /// Moves each box by up to `step` on each axis.
@@ -50,37 +45,6 @@ fn wander(boxes: &mut [Aabb], step: f32, random: &mut Random) {
             b.max[a] += by;
         }
     }
-}
-
-#[test]
-fn kept_pairs_survive_a_change_from_8_threads_to_1() {
-    let registry = Registry::with_cores(8);
-    let ids = ["pair-cache@cpu1", "pair-cache@cpu8"].map(|id| id.parse().unwrap());
-    let Ok(Some(mut pair_cache)) = registry.create_family(&ids.each_ref()) else {
-        // Built without threads.
-        return;
-    };
-    let mut random = Random(0xdea1);
-    let mut pairs = Pairs::with_order(PairOrder::Canonical);
-    // So many pairs that the lists of eight threads have room for them, and that of one has not.
-    let mut boxes = random.cubes(400, [11.0; 3], 0.5);
-    let middle = boxes[0].min;
-    for frame in 0..400 {
-        assert!(pair_cache.set_threads(if frame % 3 == 2 { 1 } else { 8 }));
-        for (k, b) in boxes.iter_mut().enumerate() {
-            // Towards each other until they are dense, and a few leave their grown box in every frame.
-            let pull = if frame < 330 { 0.006 } else { 0.0 };
-            for (a, middle) in middle.into_iter().enumerate() {
-                let by = (middle - b.min[a]) * pull + if k % 40 == frame % 40 { 0.2 } else { 0.0 };
-                b.min[a] += by;
-                b.max[a] += by;
-            }
-        }
-        pair_cache.find_pairs(&boxes, &mut pairs).unwrap();
-        let expected = naive(&boxes);
-        assert!(pairs.as_slice() == expected, "frame {frame}: {} pairs, not {}", pairs.len(), expected.len());
-    }
-    assert!(pairs.len() > 40 * boxes.len(), "{} pairs", pairs.len());
 }
 
 #[test]
@@ -241,7 +205,6 @@ fn too_many_pairs_to_keep_are_found() {
 fn infinite_box_joins_kept_pairs() {
     let mut boxes = Random(4).cubes(1000, [12.0; 3], 0.5);
     let mut algorithms = every_algorithm();
-    let mut pairs = Pairs::with_order(PairOrder::Canonical);
     for frame in 0..8 {
         match frame {
             5 => boxes.push(Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3])),
@@ -249,9 +212,6 @@ fn infinite_box_joins_kept_pairs() {
             6.. => boxes[frame] = Aabb::cube([frame as f32; 3], 0.5),
             _ => {}
         }
-        for (id, algorithm) in &mut algorithms {
-            algorithm.find_pairs(&boxes, &mut pairs).unwrap();
-            assert!(pairs.as_slice() == naive(&boxes), "{id}, frame {frame}: {} pairs", pairs.len());
-        }
+        assert_all_agree(&format!("frame {frame}"), &boxes, &mut algorithms);
     }
 }

@@ -9,7 +9,7 @@
 
 mod common;
 
-use common::{every_algorithm, naive};
+use common::{assert_each_finds, every_algorithm, naive};
 use sapwise::{Adaptive, BroadPhase, PairOrder, Pairs, Registry, Tuning};
 use sapwise_scenes::Frames;
 use std::path::Path;
@@ -31,13 +31,9 @@ fn fixture_is_as_expected() {
 #[test]
 fn every_algorithm_matches_the_double_loop() {
     let mut algorithms = every_algorithm();
+    let mut pairs = Pairs::with_order(PairOrder::Canonical);
     for (at, boxes) in frames().iter().enumerate() {
-        let expected = naive(boxes);
-        for (id, algorithm) in &mut algorithms {
-            let mut pairs = Pairs::with_order(PairOrder::Canonical);
-            algorithm.find_pairs(boxes, &mut pairs).unwrap();
-            assert!(pairs.as_slice() == expected, "{id}, frame {at}: {} pairs, not {}", pairs.len(), expected.len());
-        }
+        assert_each_finds(&naive(boxes), &mut algorithms, boxes, &mut pairs, &format!("frame {at}"));
     }
 }
 

@@ -122,8 +122,7 @@ fn build_pool(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
-    use std::sync::{Barrier, Mutex, mpsc};
+    use std::sync::{Barrier, Mutex};
     use std::thread::{ThreadId, current};
 
     /// Returns the threads that work if `threads` helpers are wanted, `all` of them at once, the caller among them.
@@ -149,52 +148,6 @@ mod tests {
             let seen = pool.install(|| working(&helpers, size, size));
             assert!(seen.len() == size && seen.iter().all(|id| own.contains(id)));
         }
-    }
-
-    /// However many frames call meanwhile, only as many invitations as the pool has threads wait in its queue.
-    #[test]
-    fn busy_pool_is_neither_waited_for_nor_flooded() {
-        let pool = Arc::new(build_pool(2, None, 0).unwrap());
-        let helpers = Helpers::of(Arc::clone(&pool));
-        let (came, here) = mpsc::channel();
-        let gates: Vec<_> = (0..2)
-            .map(|_| {
-                let (came, (open, gate)) = (came.clone(), mpsc::channel::<()>());
-                pool.spawn(move || {
-                    came.send(()).unwrap();
-                    let _ = gate.recv();
-                });
-                open
-            })
-            .collect();
-        (0..2).for_each(|_| here.recv().unwrap());
-        let worked = AtomicUsize::new(0);
-        for _ in 0..1000 {
-            helpers.run(2, &|| _ = worked.fetch_add(1, Relaxed));
-        }
-        assert_eq!((worked.load(Relaxed), helpers.coming()), (1000, 2));
-        drop(gates);
-        // The old invitations serve a phase that comes later.
-        assert_eq!(working(&helpers, 2, 3).len(), 3);
-    }
-
-    #[test]
-    fn panic_in_the_programs_pool_reaches_the_caller() {
-        let pool = Arc::new(build_pool(1, None, 0).unwrap());
-        let helpers = Helpers::of(Arc::clone(&pool));
-        let (both, done) = (Barrier::new(2), AtomicBool::new(false));
-        let caller = current().id();
-        let run = || {
-            helpers.run(1, &|| {
-                both.wait();
-                assert!(current().id() == caller, "a helper panics");
-                done.store(true, Relaxed);
-            });
-        };
-        let caught = std::panic::catch_unwind(std::panic::AssertUnwindSafe(run)).unwrap_err();
-        assert_eq!((caught.downcast_ref(), done.into_inner()), (Some(&"a helper panics"), true));
-        // The pool's thread still works.
-        assert_eq!(working(&helpers, 1, 2).len(), 2);
     }
 
     #[cfg(target_os = "linux")]

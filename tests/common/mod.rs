@@ -3,7 +3,7 @@
 
 use sapwise::algorithm::SimdLevel;
 use sapwise::internals::Pair;
-use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Membership, Registry};
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Membership, Pairs, Registry};
 
 /// The oracle: the definition of overlap, in a double loop.
 pub(crate) fn naive(boxes: &[Aabb]) -> Vec<Pair> {
@@ -85,6 +85,20 @@ pub(crate) fn naive_filtered(boxes: &[Aabb], memberships: &[Membership]) -> Vec<
         a.groups & b.mask != 0 && b.groups & a.mask != 0 && !(a.fixed && b.fixed) && apart
     });
     pairs
+}
+
+/// Asserts that each algorithm finds these pairs, under the filter of `pairs` and in its order, which is canonical.
+pub(crate) fn assert_each_finds(
+    expected: &[Pair],
+    algorithms: &mut [(String, Box<dyn BroadPhase>)],
+    boxes: &[Aabb],
+    pairs: &mut Pairs,
+    what: &str,
+) {
+    for (id, algorithm) in algorithms {
+        algorithm.find_pairs(boxes, pairs).unwrap();
+        assert!(pairs.as_slice() == expected, "{id}, {what}: {} pairs, not {}", pairs.len(), expected.len());
+    }
 }
 
 /// Marsaglia's xorshift: the tests use no generator of the library.
