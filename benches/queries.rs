@@ -53,7 +53,7 @@ impl Contestant for Tree {
         let mut found = (0, 0);
         for ray in rays {
             let mut first = f32::INFINITY;
-            self.cast_ray(ray, |_, t| {
+            self.cast_box(&Aabb::new(ray.origin, ray.origin), ray.direction, ray.max, |_, t| {
                 first = t;
                 t
             });
@@ -67,7 +67,7 @@ impl Contestant for Tree {
     fn all_hits(&self, rays: &[Ray]) -> Found {
         let mut found = (0, 0);
         for ray in rays {
-            self.cast_ray(ray, |id, _| {
+            self.cast_box(&Aabb::new(ray.origin, ray.origin), ray.direction, ray.max, |id, _| {
                 count(&mut found, id);
                 f32::INFINITY
             });

@@ -127,13 +127,8 @@ impl Aabb {
     /// Returns an error for the first invalid box. `first` is the position of the first of `boxes`.
     #[doc(hidden)]
     pub fn check(boxes: &[Self], first: usize) -> Result<(), Error> {
-        match boxes.iter().position(|b| b.defect().is_some()) {
-            None => Ok(()),
-            Some(at) => {
-                let defect = boxes[at].defect().unwrap_or(BoxDefect::NotANumber);
-                Err(Error::InvalidBox { index: first + at, defect })
-            }
-        }
+        let invalid = boxes.iter().zip(first..).find_map(|(b, index)| Some((index, b.defect()?)));
+        invalid.map_or(Ok(()), |(index, defect)| Err(Error::InvalidBox { index, defect }))
     }
 }
 

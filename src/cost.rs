@@ -140,11 +140,13 @@ impl Work {
     #[doc(hidden)]
     #[must_use]
     pub fn defect(&self) -> Option<CurveError> {
-        if let Some(t) = self.terms.iter().find(|t| !(0.0..=MOST_UNIT_NS).contains(&t.unit_ns)) {
-            return Some(CurveError::Unit { term: t.term, unit_ns: t.unit_ns });
-        }
-        if let Some(t) = self.terms.iter().find(|t| matches!(t.term, Term::Product(p) if !p.is_sound())) {
-            return Some(CurveError::Powers { term: t.term });
+        for &CostTerm { term, unit_ns } in &self.terms {
+            if !(0.0..=MOST_UNIT_NS).contains(&unit_ns) {
+                return Some(CurveError::Unit { term, unit_ns });
+            }
+            if matches!(term, Term::Product(product) if !product.is_sound()) {
+                return Some(CurveError::Powers { term });
+            }
         }
         if !(self.cache_bytes.is_finite() && self.cache_bytes >= 0.0) {
             return Some(CurveError::Cache { bytes: self.cache_bytes });
@@ -181,25 +183,6 @@ impl CostCurve {
     pub fn with_fallback(mut self, work: Arc<Work>, factor: f64) -> Self {
         self.work_mut().fallback = Some(Fallback { work, factor });
         self
-    }
-
-    /// Sets the last-level cache of the machine.
-    #[must_use]
-    pub fn with_cache(mut self, cache_bytes: f64) -> Self {
-        self.work_mut().cache_bytes = cache_bytes;
-        self
-    }
-
-    /// Sets several threads.
-    #[must_use]
-    pub fn with_helpers(self, helpers: Helpers) -> Self {
-        Self { helpers: Some(helpers), ..self }
-    }
-
-    /// Sets the correction of the whole.
-    #[must_use]
-    pub fn with_residual(self, residual: Residual) -> Self {
-        Self { residual: Some(residual), ..self }
     }
 
     /// Returns the cost on one thread or on GPUs, to be changed for this algorithm alone.
@@ -249,7 +232,7 @@ mod tests {
         let mut with = curve.clone();
         with.work_mut().residual = Some(residual.clone());
         assert!((with.cost_ns(&load(16)) / curve.cost_ns(&load(16)) - 2.0).abs() < 1e-9);
-        let with = with.with_residual(residual.with_constant(3.0_f64.ln()));
+        with.residual = Some(residual.with_constant(3.0_f64.ln()));
         assert!((with.cost_ns(&load(16)) / curve.cost_ns(&load(16)) - 12.0).abs() < 1e-9);
         assert_eq!(with.defect(), None);
     }
@@ -268,7 +251,7 @@ mod tests {
     #[test]
     fn helpers_divide_work_but_not_calls() {
         let one = CostCurve::new(vec![CostTerm::new(Term::Call, 50.0), CostTerm::new(Term::Objects, 10.0)]);
-        let two = one.clone().with_helpers(Helpers::new(2).with_call(1000.0, 0.0));
+        let two = CostCurve { helpers: Some(Helpers::new(2).with_call(1000.0, 0.0)), ..one.clone() };
         assert_eq!((one.cost_ns(&load(1000)), two.cost_ns(&load(1000))), (10_050.0, 6025.0));
         // Both share one work, which is computed once.
         assert!(Arc::ptr_eq(&one.work, &two.work));
@@ -291,12 +274,16 @@ mod tests {
     fn impossible_curves_are_refused() {
         let curve = |unit_ns| CostCurve::new(vec![CostTerm::new(Term::Call, unit_ns)]);
         let places = Arc::new(Places::new(vec![load(16)]));
-        let residual = |weights: &[f64]| Residual::new(Arc::clone(&places), weights.to_vec(), false);
-        assert_eq!(curve(1.0).with_residual(residual(&[0.1])).defect(), None);
+        let with_residual = |weights: &[f64]| {
+            let residual = Residual::new(Arc::clone(&places), weights.to_vec(), false);
+            CostCurve { residual: Some(residual), ..curve(1.0) }
+        };
+        assert_eq!(with_residual(&[0.1]).defect(), None);
         for wrong in [&[f64::NAN][..], &[1e9], &[0.1, 0.1]] {
-            assert_eq!(curve(1.0).with_residual(residual(wrong)).defect(), Some(CurveError::Residual), "{wrong:?}");
+            assert_eq!(with_residual(wrong).defect(), Some(CurveError::Residual), "{wrong:?}");
         }
-        assert_eq!(curve(1.0).with_helpers(Helpers::new(1)).defect(), Some(CurveError::Helpers));
+        let alone = CostCurve { helpers: Some(Helpers::new(1)), ..curve(1.0) };
+        assert_eq!(alone.defect(), Some(CurveError::Helpers));
         let powers = CostCurve::new(vec![CostTerm::new(Term::Product(Product { pairs: 9, ..Product::ONE }), 1.0)]);
         assert!(matches!(powers.defect(), Some(CurveError::Powers { .. })));
         assert!(curve(-1.0).defect().is_some() && curve(f64::NAN).defect().is_some() && curve(0.0).defect().is_some());

@@ -6,7 +6,6 @@ use crate::named;
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
-#[non_exhaustive]
 pub struct GpuIdentity {
     /// The number in `gpu0`, `gpu1` and so on: discrete GPUs first, software adapters last, otherwise in the driver's
     /// order.
@@ -46,11 +45,5 @@ impl GpuIdentity {
     #[must_use]
     pub fn new(index: u32, name: impl Into<String>, kind: GpuKind) -> Self {
         Self { index, name: name.into(), device: String::new(), driver: String::new(), api: String::new(), kind }
-    }
-
-    /// Sets device number, driver and interface.
-    #[must_use]
-    pub fn with_driver(self, device: impl Into<String>, driver: impl Into<String>, api: impl Into<String>) -> Self {
-        Self { device: device.into(), driver: driver.into(), api: api.into(), ..self }
     }
 }

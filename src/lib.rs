@@ -48,8 +48,6 @@ mod adaptive;
 pub mod algorithm;
 mod between;
 mod broad_phase;
-#[cfg(feature = "parallel")]
-mod cgroup;
 mod changes;
 mod clock;
 mod cost;

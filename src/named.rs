@@ -15,12 +15,6 @@ impl UnknownName {
     pub fn new(kind: &'static str, text: &str) -> Self {
         Self { kind, text: text.to_owned() }
     }
-
-    /// Returns the name.
-    #[must_use]
-    pub fn text(&self) -> &str {
-        &self.text
-    }
 }
 
 impl fmt::Display for UnknownName {

@@ -1,18 +1,16 @@
 //! The algorithms that this machine can run.
 
-use crate::algorithm::{AlgorithmId, Backend, MOST_THREADS, ParseIdError};
+use crate::algorithm::{AlgorithmId, Backend, BackendClass, MOST_THREADS, ParseIdError};
 use crate::broad_phase::BroadPhase;
-use crate::cpu::{self, Create, Made, Method, Simd, SimdLevel, Threads, Workers};
+use crate::cpu::{self, Made, Method, Simd, SimdLevel, Threads, Workers};
 use crate::entry::Entry;
 use crate::error::{Error, Unavailable};
 use std::any::{Any, TypeId};
 use std::fmt;
 use std::sync::Arc;
 
-/// Makes an instance of a user's algorithm.
-type Factory = Box<dyn Fn() -> Made + Send + Sync>;
 /// Makes an instance of a user's algorithm for these numbers of threads, ascending.
-type FamilyFactory = Arc<dyn Fn(&[u32]) -> Made + Send + Sync>;
+type Factory = Arc<dyn Fn(&[u32]) -> Made + Send + Sync>;
 
 /// All known algorithms, each with the reason if it can't run here.
 ///
@@ -41,8 +39,13 @@ enum Maker {
     BuiltIn,
     /// The source of this type.
     Source(TypeId),
-    One(Factory),
-    Family(FamilyFactory),
+    User(UsersMaker),
+}
+
+struct UsersMaker {
+    make: Factory,
+    /// Whether one instance runs on several numbers of threads.
+    is_family: bool,
 }
 
 impl Registry {
@@ -81,7 +84,8 @@ impl Registry {
         revision: u32,
         factory: impl Fn() -> Result<Box<dyn BroadPhase>, Error> + Send + Sync + 'static,
     ) {
-        self.set(Entry::new(id, revision), Maker::One(Box::new(factory)));
+        let make = Arc::new(move |_: &[u32]| factory());
+        self.set(Entry::new(id, revision), Maker::User(UsersMaker { make, is_family: false }));
     }
 
     /// Adds a user's [incremental](BroadPhase::is_incremental) algorithm that runs on any of these numbers of CPU
@@ -100,8 +104,11 @@ impl Registry {
         factory: impl Fn(&[u32]) -> Result<Box<dyn BroadPhase>, Error> + Send + Sync + 'static,
     ) -> Result<(), ParseIdError> {
         let ids = threads.iter().map(|&k| AlgorithmId::new(method, Backend::Cpu(k))).collect::<Result<Vec<_>, _>>()?;
-        let factory: FamilyFactory = Arc::new(factory);
-        ids.into_iter().for_each(|id| self.set(Entry::new(id, revision), Maker::Family(Arc::clone(&factory))));
+        let factory: Factory = Arc::new(factory);
+        for id in ids {
+            let maker = UsersMaker { make: Arc::clone(&factory), is_family: true };
+            self.set(Entry::new(id, revision), Maker::User(maker));
+        }
         Ok(())
     }
 
@@ -121,9 +128,11 @@ impl Registry {
     }
 
     /// Returns the maker of an algorithm that a user added; `None` if it is built in or a source's.
-    fn users_maker(&self, id: &AlgorithmId) -> Option<&Maker> {
-        let maker = self.position(id).map(|at| &self.makers[at]);
-        maker.filter(|maker| matches!(maker, Maker::One(_) | Maker::Family(_)))
+    fn users_maker(&self, id: &AlgorithmId) -> Option<&UsersMaker> {
+        match &self.makers[self.position(id)?] {
+            Maker::User(maker) => Some(maker),
+            _ => None,
+        }
     }
 
     /// Adds the algorithms of a source, except those whose ids are listed already. It replaces an earlier source of
@@ -215,7 +224,7 @@ impl Registry {
         }
         for (entry, maker) in self.entries.iter_mut().zip(&self.makers) {
             if let (&Backend::Cpu(threads), Maker::BuiltIn) = (entry.id.backend(), maker) {
-                entry.unavailable = unavailable(&self.threads, self.cores, threads);
+                entry.unavailable = self.threads.unavailable(threads, self.cores);
             }
         }
     }
@@ -227,7 +236,7 @@ impl Registry {
     }
 
     fn unavailable(&self, threads: u32) -> Option<Unavailable> {
-        unavailable(&self.threads, self.cores, threads)
+        self.threads.unavailable(threads, self.cores)
     }
 
     /// Returns every algorithm, the built-in ones first.
@@ -280,19 +289,23 @@ impl Registry {
     /// [`Error::UnknownAlgorithm`]. [`Error::Unavailable`], for example if a file from a larger machine names more
     /// threads than this one has cores.
     pub fn create(&self, id: &AlgorithmId) -> Result<Box<dyn BroadPhase>, Error> {
-        match (self.users_maker(id), built_in(id), id.backend()) {
-            (Some(Maker::One(factory)), ..) => factory(),
-            (Some(Maker::Family(factory)), ..) => factory(&[id.threads()]),
-            (_, Some(method), &Backend::Cpu(threads)) => match (self.unavailable(threads), method.create) {
-                (Some(reason), _) => Err(Error::Unavailable { algorithm: id.clone(), reason }),
-                (None, Create::OneWidth(create)) => create(threads, &self.threads, Simd::at_most(self.simd)),
-                (None, Create::AnyWidth(create)) => create(&[threads], &self.threads, Simd::at_most(self.simd)),
-            },
-            _ => self.sources.iter().find_map(|source| source.create(id)).unwrap_or_else(|| {
-                let known: Vec<String> = self.entries.iter().map(|e| e.id.to_string()).collect();
-                Err(Error::UnknownAlgorithm { text: id.to_string(), hint: format!("known here: {}", known.join(", ")) })
-            }),
+        if let Some(users) = self.users_maker(id) {
+            return (users.make)(&[id.threads()]);
         }
+        if let Some(method) = built_in(id) {
+            return match self.unavailable(id.threads()) {
+                Some(reason) => Err(Error::Unavailable { algorithm: id.clone(), reason }),
+                None => self.make(method, &[id.threads()]),
+            };
+        }
+        self.sources.iter().find_map(|source| source.create(id)).unwrap_or_else(|| {
+            let known: Vec<String> = self.entries.iter().map(|e| e.id.to_string()).collect();
+            Err(Error::UnknownAlgorithm { text: id.to_string(), hint: format!("known here: {}", known.join(", ")) })
+        })
+    }
+
+    fn make(&self, method: &Method, threads: &[u32]) -> Made {
+        method.create.make(threads, &self.threads, Simd::at_most(self.simd))
     }
 
     /// Makes one instance for all of `ids`, which keeps its state when [`BroadPhase::set_threads`] changes the number
@@ -302,61 +315,28 @@ impl Registry {
     /// # Errors
     /// As [`create`](Self::create).
     pub fn create_family(&self, ids: &[&AlgorithmId]) -> Result<Option<Box<dyn BroadPhase>>, Error> {
-        let Some((first, rest)) = ids.split_first() else { return Ok(None) };
-        let Some(family) = self.family(first) else { return Ok(None) };
-        if !rest.iter().all(|id| id.method() == first.method() && self.family(id).is_some_and(|f| f.is(&family))) {
-            return Ok(None);
-        }
+        let Some(first) = ids.first() else { return Ok(None) };
         let mut threads: Vec<u32> = ids.iter().map(|id| id.threads()).collect();
         threads.sort_unstable();
         threads.dedup();
-        match family {
-            Family::BuiltIn(create) => create(&threads, &self.threads, Simd::at_most(self.simd)),
-            Family::Users(factory) => factory(&threads),
+        if let Some(users) = self.users_maker(first) {
+            let is_same = |other: &UsersMaker| other.is_family && Arc::ptr_eq(&other.make, &users.make);
+            let is_family = ids.iter().all(|id| self.users_maker(id).is_some_and(is_same));
+            return is_family.then(|| (users.make)(&threads)).transpose();
         }
-        .map(Some)
-    }
-
-    /// Returns the family of an algorithm that can run here, if it has one.
-    fn family(&self, id: &AlgorithmId) -> Option<Family<'_>> {
-        let &Backend::Cpu(threads) = id.backend() else { return None };
-        match self.users_maker(id) {
-            Some(Maker::Family(factory)) => Some(Family::Users(factory)),
-            Some(_) => None,
-            None => match built_in(id)?.create {
-                Create::AnyWidth(create) if self.unavailable(threads).is_none() => Some(Family::BuiltIn(create)),
-                _ => None,
-            },
-        }
+        let Some(method) = built_in(first).filter(|method| method.create.is_family()) else { return Ok(None) };
+        let is_built_in = |id: &&AlgorithmId| {
+            built_in(id).is_some_and(|other| other.name == method.name)
+                && self.users_maker(id).is_none()
+                && self.unavailable(id.threads()).is_none()
+        };
+        ids.iter().all(is_built_in).then(|| self.make(method, &threads)).transpose()
     }
 }
 
-/// Makes one instance for several numbers of threads.
-enum Family<'a> {
-    BuiltIn(fn(&[u32], &Threads, Simd) -> Made),
-    Users(&'a FamilyFactory),
-}
-
-impl Family<'_> {
-    /// Returns whether two algorithms of one method belong to the same family.
-    fn is(&self, other: &Self) -> bool {
-        match (self, other) {
-            (Self::BuiltIn(_), Self::BuiltIn(_)) => true,
-            (Self::Users(a), Self::Users(b)) => Arc::ptr_eq(a, b),
-            _ => false,
-        }
-    }
-}
-
-/// Returns why a built-in algorithm can't have `threads` threads of `pool` in a registry of `cores` cores, or `None` if
-/// it can.
-fn unavailable(pool: &Threads, cores: u32, threads: u32) -> Option<Unavailable> {
-    pool.unavailable(threads).or_else(|| (threads > cores).then_some(Unavailable::TooFewCores { threads, most: cores }))
-}
-
-/// Returns the built-in CPU method of an algorithm.
+/// Returns the built-in method of an algorithm on the CPU.
 fn built_in(id: &AlgorithmId) -> Option<&'static Method> {
-    cpu::METHODS.iter().find(|m| m.name == id.method())
+    cpu::METHODS.iter().find(|m| m.name == id.method() && id.backend().class() == BackendClass::Cpu)
 }
 
 impl Default for Registry {

@@ -94,8 +94,6 @@ pub struct Space {
     keys: Vec<u64>,
     before: Vec<u64>,
     sorter: Sorter,
-    begun_keys: Vec<u64>,
-    ended_keys: Vec<u64>,
     /// All pairs: first those of two resting bodies.
     pairs: Vec<(Handle, Handle)>,
     begun: Vec<(Handle, Handle)>,
@@ -174,8 +172,6 @@ impl Space {
             keys: Vec::new(),
             before: Vec::new(),
             sorter: Sorter::default(),
-            begun_keys: Vec::new(),
-            ended_keys: Vec::new(),
             pairs: Vec::new(),
             begun: Vec::new(),
             ended: Vec::new(),

@@ -1,8 +1,6 @@
 //! Tunings: the cheapest algorithm for each load (the paper's fields of optimal performance).
 
 mod crossover;
-#[cfg(test)]
-mod drawn;
 mod error;
 #[cfg(feature = "serde")]
 mod file;
@@ -10,7 +8,6 @@ mod slice;
 pub(crate) mod tangents;
 
 use crate::algorithm::{AlgorithmId, BackendClass, Load};
-use crate::cost::Frame;
 use crate::cost::Residual;
 use crate::named;
 use crate::registry::Registry;
@@ -107,17 +104,6 @@ pub struct AlgorithmCost {
     pub spread_ln: f64,
 }
 
-/// The two cheapest algorithms under a load.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ranking {
-    /// Position of the cheapest in [`Tuning::costs`].
-    pub best: usize,
-    /// Its predicted cost in nanoseconds.
-    pub best_ns: f64,
-    /// Position and predicted cost of the next.
-    pub runner_up: Option<(usize, f64)>,
-}
-
 impl Step {
     /// `algorithm`, from this many objects up.
     #[must_use]
@@ -195,9 +181,19 @@ impl Tuning {
         loads: &[Load],
         spread: impl Fn(usize, usize, &Load) -> f64,
     ) -> Self {
-        let mut tuning = Self { scenario: scenario.to_owned(), costs, ..Self::empty(source) };
-        tuning.cut(loads, &spread);
-        tuning
+        let slice = Slice::new(loads);
+        let fields = slice.steps(&costs);
+        let crossovers = fields.windows(2).map(|two| {
+            let (below, (from, above)) = (two[0].1, two[1]);
+            slice.crossover(&costs[below], &costs[above], from.objects, |load| spread(below, above, load))
+        });
+        let crossovers = crossovers.collect();
+        let steps = fields.iter().enumerate().map(|(k, (from, best))| {
+            let from_objects = if k == 0 { 0 } else { from.objects };
+            Step { from_objects, algorithm: costs[*best].algorithm.clone() }
+        });
+        let steps = steps.collect();
+        Self { scenario: scenario.to_owned(), steps, crossovers, costs, ..Self::empty(source) }
     }
 
     fn empty(source: Source) -> Self {
@@ -259,24 +255,12 @@ impl Tuning {
         self
     }
 
-    /// The two cheapest algorithms under `load`. `usable` gets a position in [`Tuning::costs`] and says whether it
-    /// may be chosen. `None` without cost curves, or when none is usable.
+    /// Returns the position in [`Tuning::costs`] of the cheapest algorithm under `load`, and its predicted cost in
+    /// nanoseconds. `usable` gets a position and returns whether that algorithm may be chosen. `None` without cost
+    /// curves, or if none is usable.
     #[must_use]
-    pub fn rank(&self, load: &Load, usable: impl Fn(usize) -> bool) -> Option<Ranking> {
-        let frame = Frame::new(load);
-        let mut ranking: Option<Ranking> = None;
-        for (k, cost) in self.costs.iter().enumerate().filter(|&(k, _)| usable(k)) {
-            let ns = cost.curve.cost_of(&frame);
-            ranking = Some(match ranking {
-                None => Ranking { best: k, best_ns: ns, runner_up: None },
-                Some(r) if ns < r.best_ns => Ranking { best: k, best_ns: ns, runner_up: Some((r.best, r.best_ns)) },
-                Some(r) if r.runner_up.is_none_or(|(_, second)| ns < second) => {
-                    Ranking { runner_up: Some((k, ns)), ..r }
-                }
-                Some(r) => r,
-            });
-        }
-        ranking
+    pub fn cheapest(&self, load: &Load, usable: impl Fn(usize) -> bool) -> Option<(usize, f64)> {
+        slice::cheapest(&self.costs, load, usable)
     }
 
     /// The step that holds at a number of objects.
@@ -319,48 +303,9 @@ impl Tuning {
         }
         None
     }
-
-    /// Sets `steps` and `crossovers` along these loads. `spread` is that of [`from_costs_with`](Self::from_costs_with).
-    fn cut(&mut self, loads: &[Load], spread: &dyn Fn(usize, usize, &Load) -> f64) {
-        let slice = Slice::new(loads);
-        let steps = slice.steps(&self.costs);
-        let crossover = |w: &[(Load, usize)]| {
-            let (below, above) = (w[0].1, w[1].1);
-            self.crossover(&slice, below, above, w[1].0.objects, &|load| spread(below, above, load))
-        };
-        self.crossovers = steps.windows(2).map(crossover).collect();
-        self.steps = steps
-            .iter()
-            .enumerate()
-            .map(|(k, (load, best))| Step {
-                from_objects: if k == 0 { 0 } else { load.objects },
-                algorithm: self.costs[*best].algorithm.clone(),
-            })
-            .collect();
-    }
-
-    fn crossover(
-        &self,
-        slice: &Slice<'_>,
-        below: usize,
-        above: usize,
-        objects: u32,
-        spread: &dyn Fn(&Load) -> f64,
-    ) -> Crossover {
-        let (b, a) = (&self.costs[below], &self.costs[above]);
-        let doubt = |load: &Load| crate::stats::NORMAL_90 * spread(load);
-        // Positive if the algorithm of the upper field is cheaper.
-        let gain = |load: &Load| (b.curve.cost_ns(load) / a.curve.cost_ns(load)).ln();
-        let objects = f64::from(objects);
-        Crossover {
-            below: b.algorithm.clone(),
-            above: a.algorithm.clone(),
-            objects,
-            low: Some(slice.reach(objects, false, |l| gain(l) <= -doubt(l))),
-            high: Some(slice.reach(objects, true, |l| gain(l) >= doubt(l))),
-        }
-    }
 }
 
+#[cfg(test)]
+use tests::drawn;
 #[cfg(test)]
 mod tests;

@@ -2,7 +2,7 @@
 
 use crate::aabb::Aabb;
 use crate::broad_phase::check_count;
-use crate::cpu::{Outputs, Simd, Workers, WorldSearch, part};
+use crate::cpu::{Outputs, Simd, Workers, WorldSearch, part, reserve, split};
 use crate::error::Error;
 use crate::pair::Pair;
 use crate::pairs::Pairs;
@@ -74,8 +74,7 @@ impl Worlds {
         let workers = &workers.fit(boxes.len() / BOXES_PER_BOX);
         let _frame = workers.frame();
         workers.check(boxes)?;
-        let refused = |_| Error::OutOfMemory { what: "offsets of worlds", elements: starts.len() };
-        offsets.try_reserve(starts.len()).map_err(refused)?;
+        reserve(offsets, starts.len(), "offsets of worlds")?;
         offsets.resize(starts.len(), 0);
         if searches.len() < workers.tasks() {
             searches.resize_with(workers.tasks(), || WorldSearch::new(*simd));
@@ -133,14 +132,10 @@ fn find(
     // The last part has the empty worlds at the end too.
     let before = |first: usize| starts.partition_point(|&start| start < first);
     let cut = |k: usize| if k == parts { worlds } else { before(part(boxes.len(), k, parts).start) };
-    let mut rest = &mut *begins;
-    let tasks = lists.iter_mut().zip(searches).enumerate().map(|(k, (list, search))| {
-        let (begins, behind) = std::mem::take(&mut rest).split_at_mut(cut(k + 1) - cut(k));
-        rest = behind;
-        (&starts[cut(k)..], begins, list, search)
-    });
-    workers.try_each_of(tasks, |(starts, begins, list, search)| {
-        begins.iter_mut().zip(starts.windows(2)).try_for_each(|(begin, world)| {
+    let parts_of_begins = split(begins, (0..parts).map(|k| cut(k + 1) - cut(k)));
+    let tasks = lists.iter_mut().zip(searches).zip(parts_of_begins).enumerate();
+    workers.try_each_of(tasks, |(k, ((list, search), begins))| {
+        begins.iter_mut().zip(starts[cut(k)..].windows(2)).try_for_each(|(begin, world)| {
             *begin = list.len();
             search.find(boxes, world[0]..world[1], list)
         })

@@ -1,8 +1,8 @@
 //! What was measured of one scenario at one size.
 
 use crate::contestants::{Contestant, Side};
-use sapwise::internals::stats::quantile;
 use sapwise_scenes::Scenario;
+use sapwise_tune::stats::quantile;
 
 /// How a contestant did.
 pub(crate) struct Lane {

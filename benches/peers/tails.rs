@@ -4,8 +4,8 @@ use crate::contestants::{Contestant, Side};
 use crate::point::{Lane, Point, Tail};
 use crate::race::{Race, is_at_peak};
 use crate::settings::Settings;
-use sapwise::internals::stats::quantile;
 use sapwise_scenes::Scene;
+use sapwise_tune::stats::quantile;
 use std::time::{Duration, Instant};
 
 /// Frames of a stream, and how often it is run.

@@ -5,8 +5,8 @@ use crate::args::Probe;
 use crate::date;
 use crate::gpus::uses;
 use sapwise::algorithm::{Entry, SimdLevel, usable_cores};
-use sapwise::internals::stats::median;
 use sapwise_lab::report::{Label, Point, Provenance, Restricted, Restriction, Timed, TimedTerm};
+use sapwise_tune::stats::median;
 use sapwise_tune::{GpuKind, Hardware};
 use std::time::Duration;
 

@@ -51,12 +51,8 @@ pub struct Residual {
     pub by_motion: bool,
 }
 
-/// Similarity of a load to each place, 0 to 1.
-#[derive(Debug, Clone)]
-pub(super) struct Likeness {
-    by_motion: [f64; Places::MOST],
-    whatever_moves: [f64; Places::MOST],
-}
+/// Similarity of a load to each place, 0 to 1: whatever moves, and by motion.
+pub(super) type Likeness = [[f64; Places::MOST]; 2];
 
 impl Places {
     /// Most places of a residual. 96 improved no choice on held-out machines, and each place costs time in every
@@ -67,18 +63,14 @@ impl Places {
     #[must_use]
     pub fn new(mut loads: Vec<Load>) -> Self {
         loads.truncate(Self::MOST);
-        let sizes = sizes(&loads);
-        Self::within(loads, sizes)
+        let all = loads.clone();
+        Self::of_sizes(loads, &all)
     }
 
     /// Creates places at these loads, clamped to the sizes of `all`.
     #[must_use]
     pub fn of_sizes(loads: Vec<Load>, all: &[Load]) -> Self {
-        Self::within(loads, sizes(all))
-    }
-
-    fn within(loads: Vec<Load>, octaves: [f64; 2]) -> Self {
-        let count = loads.len();
+        let (count, octaves) = (loads.len(), sizes(all));
         let mut coordinates = vec![0.0; COORDINATES * count];
         for (k, load) in loads.iter().enumerate() {
             for (c, x) in coordinates_of(load, octaves).into_iter().enumerate() {
@@ -98,8 +90,7 @@ impl Places {
     /// With `by_motion` it depends on how far boxes move too.
     #[must_use]
     pub fn likeness(&self, load: &Load, by_motion: bool) -> Vec<f64> {
-        let likeness = self.likeness_of(load);
-        likeness.of(by_motion)[..self.loads.len()].to_vec()
+        self.likeness_of(load)[usize::from(by_motion)][..self.loads.len()].to_vec()
     }
 
     /// Returns places of scenes of constant density that move little, for costs without places.
@@ -114,21 +105,21 @@ impl Places {
     pub(super) fn likeness_of(&self, load: &Load) -> Likeness {
         let at = coordinates_of(load, self.octaves);
         let count = self.loads.len();
-        let mut likeness = Likeness { by_motion: [0.0; Self::MOST], whatever_moves: [0.0; Self::MOST] };
+        let [mut whatever_moves, mut by_motion] = [[0.0; Self::MOST]; 2];
         // Coordinate by coordinate over all places, so that the compiler takes several places at a time.
         let (rest, motion) = self.coordinates.split_at((COORDINATES - 1) * count);
-        let distances = &mut likeness.whatever_moves[..count];
+        let distances = &mut whatever_moves[..count];
         for (x, row) in at.iter().zip(rest.chunks_exact(count.max(1))) {
             for (d, y) in distances.iter_mut().zip(row) {
                 *d += (x - y) * (x - y);
             }
         }
         let moved = at[COORDINATES - 1];
-        for ((k, d), y) in likeness.by_motion[..count].iter_mut().zip(distances).zip(motion) {
+        for ((k, d), y) in by_motion[..count].iter_mut().zip(distances).zip(motion) {
             *k = kernel(*d + (moved - y) * (moved - y));
             *d = kernel(*d);
         }
-        likeness
+        [whatever_moves, by_motion]
     }
 }
 
@@ -143,12 +134,6 @@ impl From<Vec<Load>> for Places {
 impl From<Places> for Vec<Load> {
     fn from(places: Places) -> Self {
         places.loads
-    }
-}
-
-impl Likeness {
-    fn of(&self, by_motion: bool) -> &[f64; Places::MOST] {
-        if by_motion { &self.by_motion } else { &self.whatever_moves }
     }
 }
 
@@ -174,7 +159,7 @@ impl Residual {
     pub(super) fn ln_of(&self, likeness: &Likeness) -> f64 {
         // Four sums side by side: one would wait for each addition.
         let mut sums = [0.0; 4];
-        let (weights, likeness) = (self.weights.chunks_exact(4), likeness.of(self.by_motion));
+        let (weights, likeness) = (self.weights.chunks_exact(4), &likeness[usize::from(self.by_motion)]);
         let rest: f64 = weights.remainder().iter().zip(&likeness[self.weights.len() & !3..]).map(|(w, k)| w * k).sum();
         for (w, k) in weights.zip(likeness.chunks_exact(4)) {
             sums.iter_mut().zip(w.iter().zip(k)).for_each(|(sum, (w, k))| *sum += w * k);

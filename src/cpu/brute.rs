@@ -4,7 +4,7 @@ use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, check_count};
 use crate::cpu::Threads;
 use crate::cpu::columns::{Columns, ensure};
-use crate::cpu::kernel::brute_rows;
+use crate::cpu::kernel::rows::brute_rows;
 use crate::cpu::level::Simd;
 use crate::cpu::outputs::Outputs;
 use crate::cpu::workers::Workers;

@@ -100,6 +100,21 @@ pub(crate) fn ensure<T: Default>(list: &mut Vec<T>, len: usize, what: &'static s
     Ok(())
 }
 
+/// Makes room for `more` elements behind those of a list. Reports a refused allocation.
+pub(crate) fn reserve<T>(list: &mut Vec<T>, more: usize, what: &'static str) -> Result<(), Error> {
+    list.try_reserve(more).map_err(|_| Error::OutOfMemory { what, elements: list.len() + more })
+}
+
+/// Splits a list into parts of these lengths.
+pub(crate) fn split<T>(list: &mut [T], lengths: impl Iterator<Item = usize>) -> impl Iterator<Item = &mut [T]> {
+    let mut rest = list;
+    lengths.map(move |length| {
+        let (part, behind) = std::mem::take(&mut rest).split_at_mut(length);
+        rest = behind;
+        part
+    })
+}
+
 /// Returns part `k` of `parts` equal parts of `0..len`.
 pub(crate) fn part(len: usize, k: usize, parts: usize) -> Range<usize> {
     let at = |k: usize| (len as u64 * k as u64 / parts as u64) as usize;

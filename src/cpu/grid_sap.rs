@@ -20,9 +20,9 @@
 use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, check_count};
 use crate::cpu::Threads;
-use crate::cpu::columns::{Columns, ensure, order_key, part};
+use crate::cpu::columns::{Columns, ensure, order_key, part, reserve};
 use crate::cpu::kernel::node::{Group, LANES};
-use crate::cpu::kernel::sweep_rows;
+use crate::cpu::kernel::rows::sweep_rows;
 use crate::cpu::level::Simd;
 use crate::cpu::outputs::Outputs;
 use crate::cpu::tree::{Members, Tree};
@@ -68,9 +68,8 @@ struct Bins {
     /// The strips of each box of the share.
     spans: Vec<StripSpan>,
     entries: Vec<Entry>,
-    /// Positions in the input of the boxes that go into the tree. The first `apart_count` are of this frame.
+    /// Positions in the input of the boxes that go into the tree.
     apart: Vec<u32>,
-    apart_count: usize,
 }
 
 /// A box in a bin.
@@ -121,9 +120,8 @@ impl BroadPhase for GridSap {
             bin.fill(&grid, boxes, part(boxes.len(), k, threads), threads, screen)
         })?;
         apart.clear();
-        let count = bins.iter().map(|b| b.apart_count).sum();
-        apart.try_reserve(count).map_err(|_| Error::OutOfMemory { what: "boxes in a tree", elements: count })?;
-        bins.iter().for_each(|b| apart.extend_from_slice(&b.apart[..b.apart_count]));
+        reserve(apart, bins.iter().map(|b| b.apart.len()).sum(), "boxes in a tree")?;
+        bins.iter().for_each(|b| apart.extend_from_slice(&b.apart));
         let tree = if apart.is_empty() {
             None
         } else {
@@ -183,13 +181,14 @@ impl Bins {
         ensure(&mut self.starts, strips + 1, "strips")?;
         ensure(&mut self.spans, share.len(), "boxes in strips")?;
         // The axes are constants in each of the three calls, so that no index is computed.
-        match grid.axis {
+        let any_apart = match grid.axis {
             0 => self.count::<0>(grid, share, first, screen)?,
             1 => self.count::<1>(grid, share, first, screen)?,
             _ => self.count::<2>(grid, share, first, screen)?,
-        }
+        };
+        self.apart.clear();
         let most = (MOST_BOXES / threads).max(MOST_OF_SHARE) as u32;
-        if self.apart_count > 0 || self.starts[..strips].iter().any(|&count| count > most) {
+        if any_apart || self.starts[..strips].iter().any(|&count| count > most) {
             self.set_apart(grid, most, first, share.len())?;
         }
         let starts = &mut self.starts[..=strips];
@@ -219,35 +218,34 @@ impl Bins {
         Ok(())
     }
 
-    /// Finds the strips of each box and counts the boxes of each bin.
+    /// Finds the strips of each box and counts the boxes of each bin. Returns whether any box goes into the tree.
     fn count<const AXIS: usize>(
         &mut self,
         grid: &StripGrid,
         share: &[Aabb],
         first: usize,
         screen: Option<&Screen>,
-    ) -> Result<(), Error> {
+    ) -> Result<bool, Error> {
         let starts = &mut self.starts[..=grid.strips()];
         starts.fill(0);
-        self.apart_count = 0;
+        let mut any_apart = false;
         for ((b, span), k) in share.iter().zip(&mut self.spans).zip(first..) {
             if let Some(defect) = b.defect() {
                 return Err(Error::InvalidBox { index: k, defect });
             }
             let passive = screen.is_some_and(|s| s.is_passive(k));
             *span = if passive { StripSpan::APART } else { grid.span::<AXIS>(b) };
-            self.apart_count += usize::from(*span == StripSpan::APART);
+            any_apart |= *span == StripSpan::APART;
             grid.each_strip(*span, |strip, _| starts[strip] += 1);
         }
-        Ok(())
+        Ok(any_apart)
     }
 
     /// Takes the boxes of strips with more than `most` boxes out of all their strips, and lists the boxes for the
     /// tree.
     fn set_apart(&mut self, grid: &StripGrid, most: u32, first: usize, len: usize) -> Result<(), Error> {
-        let Self { starts, spans, apart, apart_count, .. } = self;
+        let Self { starts, spans, apart, .. } = self;
         let starts = &mut starts[..grid.strips()];
-        *apart_count = 0;
         starts.iter_mut().filter(|count| **count > most).for_each(|count| *count |= OVERFULL);
         for (span, id) in spans[..len].iter_mut().zip(first..) {
             let mut leaves = false;
@@ -257,9 +255,8 @@ impl Bins {
                 *span = StripSpan::APART;
             }
             if *span == StripSpan::APART {
-                ensure(apart, *apart_count + 1, "boxes in a tree")?;
-                apart[*apart_count] = id as u32;
-                *apart_count += 1;
+                reserve(apart, 1, "boxes in a tree")?;
+                apart.push(id as u32);
             }
         }
         starts.iter_mut().for_each(|count| *count &= !OVERFULL);
@@ -303,9 +300,7 @@ impl Task {
             only.bin(strip)
         } else {
             self.entries.clear();
-            let elements = bins.iter().map(|b| b.bin(strip).len()).sum();
-            let refused = |_| Error::OutOfMemory { what: "boxes in strips", elements };
-            self.entries.try_reserve(elements).map_err(refused)?;
+            reserve(&mut self.entries, bins.iter().map(|b| b.bin(strip).len()).sum(), "boxes in strips")?;
             bins.iter().for_each(|b| self.entries.extend_from_slice(b.bin(strip)));
             &self.entries
         };

@@ -23,21 +23,7 @@ named! {
 
 /// Why a SIMD level can't be used.
 #[derive(Debug, Clone, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum SimdLevelError {
-    /// No level has this name.
-    Unknown {
-        /// The name.
-        text: String,
-    },
-    /// This CPU lacks the level.
-    Unsupported {
-        /// The requested level.
-        level: SimdLevel,
-        /// The highest level that this CPU has.
-        detected: SimdLevel,
-    },
-}
+pub struct SimdLevelError(String);
 
 impl SimdLevel {
     /// Returns the highest level that this CPU has.
@@ -53,10 +39,7 @@ impl SimdLevel {
     /// [`SimdLevel::requested`].
     #[must_use]
     pub fn in_use() -> Self {
-        match Self::requested() {
-            Ok(Some(level)) => level,
-            Ok(None) | Err(_) => Self::detected(),
-        }
+        Self::requested().ok().flatten().unwrap_or_else(Self::detected)
     }
 
     /// Returns the level that `SAPWISE_SIMD` names, if it is set.
@@ -64,15 +47,14 @@ impl SimdLevel {
     /// # Errors
     /// The variable names no level, or one that this CPU lacks.
     pub fn requested() -> Result<Option<Self>, SimdLevelError> {
-        match std::env::var(VARIABLE) {
-            Err(_) => Ok(None),
-            Ok(text) if text.is_empty() => Ok(None),
-            Ok(text) => {
-                let (level, detected) = (text.parse(), Self::detected());
-                let level = level.map_err(|_| SimdLevelError::Unknown { text })?;
-                if level > detected { Err(SimdLevelError::Unsupported { level, detected }) } else { Ok(Some(level)) }
-            }
+        let Some(text) = std::env::var(VARIABLE).ok().filter(|text| !text.is_empty()) else { return Ok(None) };
+        let (level, detected) = (text.parse::<Self>(), Self::detected());
+        match level {
+            Ok(level) if level <= detected => Ok(Some(level)),
+            Ok(_) => Err(format!("this CPU has no level above {detected}; use that or a lower one")),
+            Err(_) => Err("no such level; use portable, avx2 or avx512".to_owned()),
         }
+        .map_err(|why| SimdLevelError(format!("{VARIABLE}={text}: {why}")))
     }
 
     /// Returns the number of 32-bit floats in a vector of this level.
@@ -88,12 +70,7 @@ impl SimdLevel {
 
 impl fmt::Display for SimdLevelError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Unknown { text } => write!(f, "{VARIABLE}={text}: no such level; use portable, avx2 or avx512"),
-            Self::Unsupported { level, detected } => {
-                write!(f, "{VARIABLE}={level}: this CPU has no level above {detected}; use that or a lower one")
-            }
-        }
+        f.write_str(&self.0)
     }
 }
 
@@ -101,8 +78,9 @@ impl std::error::Error for SimdLevelError {}
 
 /// The level of a kernel. A level above the lowest proves that this CPU has its instructions: only [`Simd::at_most`],
 /// which asks the CPU, makes one. The `unsafe` of the kernels rests on that.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) enum Simd {
+    #[default]
     Portable,
     #[cfg(target_arch = "x86_64")]
     Avx2(Avx2),

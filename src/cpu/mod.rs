@@ -22,18 +22,18 @@ mod tree;
 mod workers;
 mod world;
 
-pub(crate) use columns::{Columns, part};
+pub(crate) use columns::{Columns, part, reserve, split};
 #[cfg(feature = "parallel")]
 pub use helpers::pinned_pool;
-pub(crate) use kernel::brute_rows;
 pub(crate) use kernel::node::{Group, LANES};
+pub(crate) use kernel::rows::brute_rows;
 pub(crate) use level::Simd;
 pub use level::{SimdLevel, SimdLevelError};
 pub(crate) use outputs::Outputs;
 pub(crate) use pair_cache::GrownTree;
 pub use threads::Threads;
 pub use tree::Tree;
-pub(crate) use tree::{Members, Near};
+pub(crate) use tree::{Members, Near, Wear};
 pub use workers::Workers;
 pub(crate) use world::WorldSearch;
 
@@ -53,13 +53,27 @@ pub(crate) struct Method {
 pub(crate) type Made = Result<Box<dyn BroadPhase>, Error>;
 
 /// Makes an instance at a SIMD level.
-#[derive(Clone, Copy)]
 pub(crate) enum Create {
     /// It runs on that many threads.
     OneWidth(fn(u32, &Threads, Simd) -> Made),
     /// It is incremental, runs on any of these numbers of threads, ascending, and keeps its state when they change. It
     /// begins with the least.
     AnyWidth(fn(&[u32], &Threads, Simd) -> Made),
+}
+
+impl Create {
+    /// Makes an instance for these numbers of threads, ascending: one number unless it [`is_family`](Self::is_family).
+    pub(crate) fn make(&self, threads: &[u32], pools: &Threads, simd: Simd) -> Made {
+        match self {
+            Self::OneWidth(create) => create(threads[0], pools, simd),
+            Self::AnyWidth(create) => create(threads, pools, simd),
+        }
+    }
+
+    /// Returns whether one instance runs on several numbers of threads.
+    pub(crate) fn is_family(&self) -> bool {
+        matches!(self, Self::AnyWidth(_))
+    }
 }
 
 /// Every method, the simplest first.

@@ -1,5 +1,6 @@
 //! The pairs that the tasks of a frame find.
 
+use crate::cpu::columns::split;
 use crate::cpu::workers::Workers;
 use crate::error::Error;
 use crate::pairs::Pairs;
@@ -55,12 +56,8 @@ impl Outputs {
     fn join(lists: &[Pairs], workers: &Workers, pairs: &mut Pairs) {
         let total: usize = lists.iter().map(Pairs::len).sum();
         let complete = lists.iter().all(Pairs::is_complete);
-        if let Some(mut room) = pairs.room(total).filter(|_| complete && total >= SMALLEST_JOIN) {
-            let parts = lists.iter().map(|list| {
-                let (to, behind) = std::mem::take(&mut room).split_at_mut(list.len());
-                room = behind;
-                (to, list)
-            });
+        if let Some(room) = pairs.room(total).filter(|_| complete && total >= SMALLEST_JOIN) {
+            let parts = split(room, lists.iter().map(Pairs::len)).zip(lists);
             workers.each_of(parts, |(to, list)| to.copy_from_slice(list.as_slice()));
             pairs.extend_by_parts(lists);
         } else {

@@ -12,14 +12,13 @@
 mod grown;
 mod motion;
 mod prices;
+mod sift;
 mod tree;
 
 use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, FrameKind, FrameWork, check_count};
 use crate::clock::Instant;
 use crate::cpu::Threads;
-use crate::cpu::columns::part;
-use crate::cpu::kernel::{overlap, prefetch};
 use crate::cpu::level::Simd;
 use crate::cpu::outputs::Outputs;
 use crate::cpu::tree::{FAR, Members, Upkeep};
@@ -29,6 +28,7 @@ use crate::load::{FramePlan, SceneStats};
 use crate::pairs::Pairs;
 use grown::{Grown, Margin, Share};
 use motion::{Motion, Work};
+use sift::Sift;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 pub(crate) use tree::GrownTree;
 
@@ -41,10 +41,9 @@ struct PairCache {
     /// The workers for each number of threads, ascending, and the position of those in use.
     widths: Vec<Workers>,
     width: usize,
-    /// As many of these threads as the frames keep busy, and the number of boxes for which they were fitted. `None`:
-    /// not yet for this width.
+    /// As many of these threads as frames of about this many boxes keep busy.
     workers: Workers,
-    fitted_for: Option<usize>,
+    fitted_for: usize,
     outputs: Outputs,
     motion: Motion,
     grown: Grown,
@@ -57,8 +56,6 @@ struct PairCache {
     /// The kept pairs, in a list for each part of the tree. A pair is in the list of the part in which it was found, so
     /// the boxes of a list are near in space, and in the cache together.
     kept: Vec<Pairs>,
-    /// All kept pairs, while they are dealt out to another number of lists.
-    dealt: Pairs,
     last_frame: FrameKind,
 }
 
@@ -92,10 +89,9 @@ fn pair_cache(threads: &[u32], pools: &Threads, simd: Simd, timed: bool) -> Resu
         upkeep: Upkeep::new(timed),
         shares: (0..tasks).map(|_| Share::default()).collect(),
         kept: vec![Pairs::new()],
-        dealt: Pairs::new(),
         last_frame: FrameKind::FromScratch,
         workers: widths[0].fit(0),
-        fitted_for: None,
+        fitted_for: 0,
         width: 0,
         widths,
     })
@@ -167,10 +163,8 @@ impl BroadPhase for PairCache {
 
     fn set_threads(&mut self, threads: u32) -> bool {
         let Some(width) = self.widths.iter().position(|w| w.threads() == threads as usize) else { return false };
-        if width != self.width {
-            self.width = width;
-            self.fitted_for = None;
-        }
+        self.width = width;
+        self.workers = self.widths[width].fit(self.fitted_for);
         true
     }
 }
@@ -182,47 +176,20 @@ fn most_of_list(most_kept: usize, tasks: usize) -> usize {
 }
 
 impl PairCache {
-    /// Takes as many threads of this width as a frame of `boxes` boxes keeps busy, with as many lists. They stay until
-    /// that number changes by a factor of two, because dealing the kept pairs out to other lists takes time. Then the
-    /// cost of a box is unknown, and nothing is kept.
+    /// Takes as many threads of this width as a frame of `boxes` boxes keeps busy. They stay until that number changes
+    /// by a factor of two. Then the cost of a box is unknown, and nothing is kept.
     fn fit(&mut self, boxes: usize) {
-        if self.fitted_for.is_some_and(|before| boxes <= 2 * before.max(1) && before <= 2 * boxes.max(1)) {
+        let before = self.fitted_for;
+        if boxes <= 2 * before.max(1) && before <= 2 * boxes.max(1) {
             return;
         }
+        self.fitted_for = boxes;
         self.workers = self.widths[self.width].fit(boxes);
-        if self.fitted_for.replace(boxes).is_some() {
-            self.grown.forget();
-            self.motion.resize();
-        }
-        let tasks = self.workers.tasks();
-        let lists = tasks * boxes.div_ceil(tasks * BOXES_PER_LIST).max(1);
-        if lists != self.kept.len() {
-            self.deal(lists);
-        }
-    }
-
-    /// Deals the kept pairs out to this many lists.
-    fn deal(&mut self, lists: usize) {
-        let Self { workers, kept, dealt, grown, motion, .. } = self;
-        dealt.clear();
-        // Without grown boxes the lists are of no use.
-        if !grown.as_slice().is_empty() {
-            kept.iter().for_each(|list| dealt.append(list));
-        }
-        kept.iter_mut().for_each(Pairs::clear);
-        kept.resize_with(lists, Pairs::new);
-        let most = most_of_list(motion.most_kept(grown.as_slice().len()), workers.tasks());
-        for (k, list) in kept.iter_mut().enumerate() {
-            let share = part(dealt.len(), k, lists);
-            // Many small tasks may keep more than a few large ones: nothing of that may be lost.
-            list.set_limit(Some(most.max(share.len())));
-            dealt.as_slice()[share].iter().for_each(|&(i, j)| list.push(i, j));
-        }
-        if !(dealt.is_complete() && kept.iter().all(Pairs::is_complete)) {
-            // Out of memory: the next frame rebuilds, and reports an error if it lacks the memory too.
-            grown.forget();
-            motion.interrupt();
-        }
+        self.grown.forget();
+        self.motion.resize();
+        // Lists for all tasks of any width: another number of threads deals nothing out anew.
+        let tasks = self.widths[self.widths.len() - 1].fit(boxes).tasks();
+        self.kept.resize_with(tasks * boxes.div_ceil(tasks * BOXES_PER_LIST).max(1), Pairs::new);
     }
 
     /// Finds the pairs among the kept ones. `took` returns the nanoseconds since the frame began, for each box.
@@ -270,7 +237,7 @@ impl PairCache {
         let sift =
             Sift { boxes, grown, tree, parts, far: boxes.len() > FAR, nobody_left: changes.left == 0 || rebuilt };
         let looked = AtomicU64::new(0);
-        let lists_of_task = parts / workers.tasks();
+        let lists_of_task = parts.div_ceil(workers.tasks());
         outputs.collect(workers, pairs, |found| {
             let tasks = kept.chunks_mut(lists_of_task).zip((0..).step_by(lists_of_task)).zip(found);
             workers.each_of(tasks, |((lists, first), found)| {
@@ -288,50 +255,6 @@ impl PairCache {
             (true, false) => Kept::CostsMore,
             (true, true) => Kept::Pays,
         })
-    }
-}
-
-/// What is needed to find the pairs of a frame in the lists of kept pairs.
-struct Sift<'a> {
-    boxes: &'a [Aabb],
-    grown: &'a Grown,
-    tree: &'a GrownTree,
-    /// Number of lists.
-    parts: usize,
-    /// Whether to prefetch boxes: they are likely not in the cache.
-    far: bool,
-    nobody_left: bool,
-}
-
-impl Sift<'_> {
-    /// Drops the pairs of boxes that left from list `k`, finds the new ones, and adds those that overlap to `found`.
-    /// Returns the number of visited nodes.
-    // Inlined into a loop over lists, the test of a pair took 1.6 times as long.
-    #[inline(never)]
-    fn list(&self, k: usize, list: &mut Pairs, found: &mut Pairs) -> u64 {
-        let Self { boxes, grown, tree, .. } = *self;
-        let overlap = |(i, j): (u32, u32)| overlap(&boxes[i as usize], &boxes[j as usize]);
-        let fetch = |(i, j): (u32, u32)| {
-            if self.far {
-                // Pairs of removed boxes are still in the list.
-                [i, j].iter().filter_map(|&id| boxes.get(id as usize)).for_each(prefetch);
-            }
-        };
-        if self.nobody_left {
-            found.extend_where(list.as_slice(), fetch, overlap);
-            return 0;
-        }
-        list.sift(found, |pair| grown.is_dirty(pair), fetch, overlap);
-        let mut nodes = 0;
-        for i in tree.moved(k, self.parts) {
-            nodes += u64::from(grown.meet(tree, i, |j| {
-                list.push(i, j);
-                if overlap((i, j)) {
-                    found.push(i, j);
-                }
-            }));
-        }
-        nodes
     }
 }
 

@@ -1,7 +1,6 @@
 //! Pins threads, for callers who ask for that: one to each physical core before any has two, and to other cores in each
 //! process.
 
-use crate::cgroup;
 use crate::splitmix::mix;
 use core_affinity::CoreId;
 use std::cell::Cell;
@@ -38,10 +37,12 @@ thread_local! {
     static POSITION: Cell<usize> = const { Cell::new(0) };
 }
 
-/// Returns whether threads may be pinned: not under a CPU quota. A quota is for time on any CPU, containers all begin
-/// with the same CPUs, and a pinned thread can't move away from a busy one.
+/// Returns whether threads may be pinned: not under the CPU quota of a cgroup. A quota is for time on any CPU,
+/// containers all begin with the same CPUs, and a pinned thread can't move away from a busy one.
 pub(crate) fn may_pin() -> bool {
-    !cgroup::has_cpu_quota()
+    // Linux: the least of affinity and quota, the quota rounded down.
+    let allowed = std::thread::available_parallelism().map_or(usize::MAX, usize::from);
+    cfg!(not(target_os = "linux")) || allowed >= core_affinity::get_core_ids().map_or(0, |cpus| cpus.len())
 }
 
 impl CpuPlacement {

@@ -6,7 +6,7 @@ use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, check_count};
 use crate::cpu::Threads;
 use crate::cpu::columns::{Columns, ensure, order_key, part};
-use crate::cpu::kernel::sweep_rows;
+use crate::cpu::kernel::rows::sweep_rows;
 use crate::cpu::level::Simd;
 use crate::cpu::outputs::Outputs;
 use crate::cpu::sort::sort;

@@ -63,13 +63,14 @@ impl Threads {
         None
     }
 
-    /// Returns why an algorithm can't have `threads` threads, or `None` if it can.
-    pub fn unavailable(&self, threads: u32) -> Option<Unavailable> {
+    /// Returns why an algorithm can't have `threads` threads if it may have as many as `cores`, or `None` if it can.
+    pub(crate) fn unavailable(&self, threads: u32, cores: u32) -> Option<Unavailable> {
         if threads > 1 && !cfg!(feature = "parallel") {
             return Some(Unavailable::NotParallel);
         }
-        let most = self.most().filter(|&most| threads > most)?;
-        Some(Unavailable::PoolTooSmall { pool: most - 1 })
+        let too_small =
+            self.most().filter(|&most| threads > most).map(|most| Unavailable::PoolTooSmall { pool: most - 1 });
+        too_small.or_else(|| (threads > cores).then_some(Unavailable::TooFewCores { threads, most: cores }))
     }
 
     /// Returns a pool of `count` helpers; the program's own pool may have more.

@@ -7,13 +7,16 @@
 
 mod codes;
 mod curve;
+mod insertion;
 mod order;
 mod queries;
+mod renewal;
 mod sweeps;
 mod upkeep;
+mod wear;
 
 use crate::aabb::Aabb;
-use crate::cpu::columns::part;
+use crate::cpu::columns::{part, reserve};
 use crate::cpu::kernel::bounds::Bounds;
 use crate::cpu::kernel::marks::Marks;
 use crate::cpu::kernel::node::{Group, LANES, Node};
@@ -23,16 +26,18 @@ use crate::cpu::level::{Simd, SimdLevel};
 use crate::cpu::threads::Threads;
 use crate::cpu::workers::Workers;
 use crate::error::Error;
-use crate::filter::{Membership, Screen};
+use crate::filter::Screen;
 use crate::load::SceneStats;
 use crate::pairs::Pairs;
 use curve::Curve;
 use order::Order;
+use renewal::Renewal;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use sweeps::{Kind, Sweeps};
 
 pub(crate) use queries::Near;
 pub(crate) use upkeep::Upkeep;
+pub(crate) use wear::Wear;
 
 /// The id of an empty lane. No box has it: there are at most this many boxes.
 pub(crate) const NOBODY: u32 = u32::MAX;
@@ -50,11 +55,8 @@ const SMALLEST_FILL: usize = 4;
 /// Places over boxes beyond which a tree has too many empty lanes.
 const MOST_PLACES: f64 = 4.0 / 3.0;
 
-/// Steps of a renewal in which codes are made, each for one part of the boxes.
-const RENEWAL_PARTS: usize = 4;
-
 /// See the module.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Tree {
     /// The box in each lane of the leaves, leaf after leaf.
     ids: Vec<u32>,
@@ -79,17 +81,6 @@ pub struct Tree {
     simd: Simd,
 }
 
-/// A new order of all boxes, made in steps: codes of one part of the boxes after the other, then sorting, then a new
-/// arrangement of the leaves.
-#[derive(Debug)]
-struct Renewal {
-    curve: Curve,
-    boxes: usize,
-    step: usize,
-    /// Active boxes, once all are sorted.
-    active: usize,
-}
-
 /// The boxes of a frame that are in a tree.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Members<'a> {
@@ -110,20 +101,7 @@ impl Members<'_> {
 
 impl Tree {
     pub(crate) fn new(simd: Simd) -> Self {
-        Self {
-            ids: Vec::new(),
-            places: 0,
-            levels: Vec::new(),
-            marks: Vec::new(),
-            active: 0,
-            sweeps: Sweeps::default(),
-            order: Order::default(),
-            curve: None,
-            renewal: None,
-            inserted: Vec::new(),
-            leaves: Vec::new(),
-            simd,
-        }
+        Self { simd, ..Self::default() }
     }
 
     /// Builds the tree of these boxes on one thread.
@@ -159,49 +137,6 @@ impl Tree {
         self.arrange(workers, boxes, curve, split, |_| false, screen)?;
         self.sweep(workers, boxes);
         Ok(())
-    }
-
-    /// Sorts all boxes anew, in several calls of which none takes long. Returns whether they stand in the new order
-    /// now, but for those that are `out` of the tree: the ones that have `jumped` since the last call, and new ones. If
-    /// the number of boxes has changed since the last call, this begins again.
-    pub(crate) fn renew(
-        &mut self,
-        workers: &Workers,
-        boxes: &[Aabb],
-        (jumped, out): (impl Iterator<Item = u32>, impl Fn(u32) -> bool + Sync),
-        stats: impl FnOnce() -> SceneStats,
-        screen: Option<&Screen>,
-    ) -> Result<bool, Error> {
-        let (len, all) = (boxes.len(), Members::From(0));
-        let begin = || Renewal { curve: Curve::over(&stats(), len), boxes: len, step: 0, active: 0 };
-        let mut renewal = self.renewal.take().filter(|renewal| renewal.boxes == len).unwrap_or_else(begin);
-        if renewal.step <= RENEWAL_PARTS {
-            // Those that were coded before they jumped.
-            let known = part(len, renewal.step, RENEWAL_PARTS).start;
-            let jumped = jumped.filter(|&id| (id as usize) < known);
-            jumped.for_each(|id| self.order.code_again(id, boxes, &renewal.curve, screen));
-        }
-        match renewal.step {
-            step @ 0..RENEWAL_PARTS => {
-                if step == 0 {
-                    self.order.begin(len)?;
-                }
-                self.order.code(workers, boxes, all, part(len, step, RENEWAL_PARTS), &renewal.curve, screen)?;
-            }
-            RENEWAL_PARTS => renewal.active = self.order.finish(workers, boxes)?,
-            _ => {
-                let Renewal { curve, active, .. } = renewal;
-                return self.arrange(workers, boxes, curve, active, out, screen).map(|()| true);
-            }
-        }
-        renewal.step += 1;
-        self.renewal = Some(renewal);
-        Ok(false)
-    }
-
-    /// Returns whether [`renew`](Self::renew) has begun and not ended.
-    pub(crate) fn is_being_renewed(&self) -> bool {
-        self.renewal.is_some()
     }
 
     /// Puts the sorted boxes into leaves. The first `split` of them are active.
@@ -435,89 +370,6 @@ impl Tree {
         &self.ids
     }
 
-    /// Adds boxes, which have no bounds yet: to empty lanes near their place on the curve, else to new leaves, whose
-    /// other lanes are for those that follow. Calls `placed` with the place and the id of each.
-    pub(crate) fn insert(
-        &mut self,
-        boxes: &[Aabb],
-        ids: impl Iterator<Item = u32>,
-        screen: Option<&Screen>,
-        mut placed: impl FnMut(usize, u32),
-    ) -> Result<(), Error> {
-        self.inserted.clear();
-        self.inserted.extend(ids.map(u64::from));
-        if self.inserted.is_empty() {
-            return Ok(());
-        }
-        if let Some(curve) = &self.curve {
-            curve.recode(&mut self.inserted, boxes);
-            self.inserted.sort_unstable();
-        }
-        let sorted = self.leaves.len();
-        // Where the last new leaf belongs.
-        let mut last = None;
-        for at in 0..self.inserted.len() {
-            let (code, id) = ((self.inserted[at] >> 32) as u32, self.inserted[at] as u32);
-            let near = self.leaves[..sorted].partition_point(|&(start, _)| start <= code).saturating_sub(1);
-            let new = last.is_some_and(|last| near <= last + 2).then(|| self.leaves.len() - 1);
-            let around = [near, near + 1, near.wrapping_sub(1), near + 2].into_iter().filter(|&leaf| leaf < sorted);
-            let place = match around.chain(new).find_map(|leaf| self.free_place(leaf)) {
-                Some(place) => place,
-                None => {
-                    last = Some(near);
-                    self.add_leaf(code)?
-                }
-            };
-            self.ids[place] = id;
-            placed(place, id);
-            self.widen_marks(place, id, screen);
-        }
-        if last.is_some() {
-            // Two runs, which the sort joins.
-            self.leaves.sort();
-        }
-        Ok(())
-    }
-
-    /// Returns an empty lane of the leaf at this position of `leaves`.
-    fn free_place(&self, leaf: usize) -> Option<usize> {
-        let first = self.leaves[leaf].1 as usize * LANES;
-        (first..first + LANES).find(|&place| self.ids[place] == NOBODY)
-    }
-
-    /// Adds a leaf behind all others, and to the end of `leaves`. Returns its first place.
-    fn add_leaf(&mut self, code: u32) -> Result<usize, Error> {
-        let first = self.ids.len();
-        self.places = first + LANES;
-        grow(&mut self.ids, self.places, NOBODY)?;
-        let mut nodes = self.places / LANES;
-        // The last level grows beyond 16 nodes, so that no level has to be added.
-        for level in self.levels.iter_mut().take_while(|level| !level.is_empty()) {
-            grow(level, nodes, Node::EMPTY)?;
-            nodes = nodes.div_ceil(LANES);
-        }
-        for (marks, level) in self.marks.iter_mut().zip(&self.levels) {
-            grow(marks, level.len(), Marks::EMPTY)?;
-        }
-        self.leaves.push((code, (first / LANES) as u32));
-        Ok(first)
-    }
-
-    fn widen_marks(&mut self, place: usize, id: u32, screen: Option<&Screen>) {
-        let of = screen.map_or(&Membership::ALL, |screen| screen.filter.of(id));
-        let mut at = place;
-        for marks in self.marks.iter_mut().take_while(|marks| !marks.is_empty()) {
-            marks[at / LANES].widen(at % LANES, of);
-            at /= LANES;
-        }
-    }
-
-    /// Removes the box at a place.
-    pub(crate) fn remove(&mut self, place: usize) {
-        self.levels[0][place / LANES].empty(place % LANES);
-        self.ids[place] = NOBODY;
-    }
-
     /// Returns the levels: the leaves, their parents, and so on.
     pub(crate) fn levels_mut(&mut self) -> &mut [Vec<Node>] {
         &mut self.levels
@@ -555,8 +407,7 @@ fn lay_out(levels: &mut Vec<Vec<Node>>, ids: &mut Vec<u32>, places: usize) -> Re
 /// Adds empty elements to a list until it has at least this many.
 fn grow<T: Copy>(list: &mut Vec<T>, len: usize, empty: T) -> Result<(), Error> {
     if list.len() < len {
-        let refused = |_| Error::OutOfMemory { what: "boxes in a tree", elements: len };
-        list.try_reserve(len - list.len()).map_err(refused)?;
+        reserve(list, len - list.len(), "boxes in a tree")?;
         list.resize(len, empty);
     }
     Ok(())

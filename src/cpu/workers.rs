@@ -179,8 +179,8 @@ impl Workers {
 #[cfg(all(test, feature = "parallel"))]
 mod tests {
     use super::*;
+    use crate::cpu::METHODS;
     use crate::cpu::level::{Simd, SimdLevel};
-    use crate::cpu::{Create, METHODS};
     use crate::pairs::Pairs;
     use crate::splitmix::mix;
     use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
@@ -246,10 +246,7 @@ mod tests {
         for method in METHODS {
             let (name, simd) = (method.name, Simd::at_most(SimdLevel::in_use()));
             let (threads, helpers, _gates) = busy_helpers();
-            let mut algorithm = match method.create {
-                Create::OneWidth(create) => create(128, &threads, simd).unwrap(),
-                Create::AnyWidth(create) => create(&[128], &threads, simd).unwrap(),
-            };
+            let mut algorithm = method.create.make(&[128], &threads, simd).unwrap();
             let mut pairs = Pairs::new();
             algorithm.find_pairs(&scene(1000), &mut pairs).unwrap();
             assert_eq!(helpers.coming(), 0, "{name}: 1000 boxes");

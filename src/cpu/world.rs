@@ -2,8 +2,8 @@
 
 use crate::aabb::Aabb;
 use crate::cpu::columns::{Columns, ensure, order_key};
+use crate::cpu::kernel::rows::sweep_rows;
 use crate::cpu::kernel::small::{MOST_ROWS, small_world};
-use crate::cpu::kernel::sweep_rows;
 use crate::cpu::level::Simd;
 use crate::cpu::tree::{Members, Tree};
 use crate::cpu::workers::Workers;
@@ -16,7 +16,7 @@ use std::ops::Range;
 const MOST_SWEPT: usize = 512;
 
 /// The buffers of the search.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct WorldSearch {
     /// Lower bound on x in the upper half, position in the input in the lower.
     keys: Vec<u64>,
@@ -27,7 +27,7 @@ pub(crate) struct WorldSearch {
 
 impl WorldSearch {
     pub(crate) fn new(simd: Simd) -> Self {
-        Self { keys: Vec::new(), columns: Columns::default(), tree: Tree::new(simd), simd }
+        Self { tree: Tree::new(simd), simd, ..Self::default() }
     }
 
     /// Adds the pairs among the boxes of `world`, which are valid.

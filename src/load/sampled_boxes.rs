@@ -26,27 +26,24 @@ impl SampledBoxes {
 
     /// Samples `count` boxes, of which `of` returns number k.
     pub fn among<'a>(count: usize, of: impl Fn(usize) -> &'a Aabb) -> Self {
-        let mut sample = Self { boxes: [Aabb::default(); MOST], count: 0 };
         // Twice the root of the count: the sample costs a small share of the frame at every size, and the share of
         // overlapping pairs, which falls with the count, stays countable.
         let wanted = count.min((2 * count.isqrt()).clamp(FEWEST, MOST));
-        if wanted == 0 {
-            return sample;
-        }
         // Other boxes in each frame if anything moves, and the same ones for the same frame.
-        let [x, y, _] = of(count / 2).min.map(f32::to_bits);
+        let middle = if wanted == 0 { Aabb::default() } else { *of(count / 2) };
+        let [x, y, _] = middle.min.map(f32::to_bits);
         let seed = mix(u64::from(x) << 32 | u64::from(y));
-        for b in one_of_each(count, wanted, seed).map(of).filter(|b| b.defect().is_none()) {
-            sample.boxes[sample.count] = *b;
-            sample.count += 1;
-        }
-        sample
+        Self::first(one_of_each(count, wanted, seed).map(of))
     }
 
     /// Takes the first 256 of boxes that were sampled elsewhere.
     pub fn given(boxes: &[Aabb]) -> Self {
+        Self::first(boxes.iter())
+    }
+
+    fn first<'a>(boxes: impl Iterator<Item = &'a Aabb>) -> Self {
         let mut sample = Self { boxes: [Aabb::default(); MOST], count: 0 };
-        for b in boxes.iter().filter(|b| b.defect().is_none()).take(MOST) {
+        for b in boxes.filter(|b| b.defect().is_none()).take(MOST) {
             sample.boxes[sample.count] = *b;
             sample.count += 1;
         }

@@ -4,7 +4,7 @@
 //! Within a bucket only the rest of a key counts. It usually has 32 bits, which halves the bytes moved. With several
 //! threads, each first sorts its own share into buckets, and then all shares of a bucket are joined.
 
-use crate::cpu::Workers;
+use crate::cpu::{Workers, split};
 use crate::pair::Pair;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
@@ -225,16 +225,6 @@ fn ensure<T: Copy + Default>(list: &mut Vec<T>, len: usize) -> Option<&mut [T]> 
         list.resize(len, T::default());
     }
     Some(&mut list[..len])
-}
-
-/// Splits a list into parts of these sizes.
-fn split<T>(list: &mut [T], sizes: impl Iterator<Item = usize>) -> impl Iterator<Item = &mut [T]> {
-    let mut rest = list;
-    sizes.map(move |size| {
-        let (part, behind) = std::mem::take(&mut rest).split_at_mut(size);
-        rest = behind;
-        part
-    })
 }
 
 /// Sorts `from` by digit, stably, and writes `make` of each element to `to`. `starts` has a counter for each digit: all

@@ -2,7 +2,7 @@
 
 use super::slots::Slots;
 use crate::aabb::Aabb;
-use crate::cpu::{GrownTree, Members, Simd, SimdLevel, Tree, Workers};
+use crate::cpu::{GrownTree, Members, Simd, SimdLevel, Tree, Wear, Workers};
 use crate::error::Error;
 use crate::load::SceneStats;
 
@@ -14,10 +14,9 @@ const SORT_IN_NODES: u64 = 5;
 const FRESH: u64 = 64;
 
 /// See the module.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Resting {
     tree: GrownTree,
-    workers: Workers,
     /// Bodies that came since the last update.
     arrivals: Vec<u32>,
     /// Number of bodies without the arrivals.
@@ -26,26 +25,13 @@ pub(super) struct Resting {
     is_built: bool,
     /// Rises when bodies come to rest: what a query found then is no longer all.
     epoch: u64,
-    /// Nodes and queries, at most [`FRESH`], since the tree was built.
-    fresh: [u64; 2],
-    /// Nodes looked at since then beyond what the same queries would have looked at in a fresh tree.
-    excess: u64,
+    wear: Wear,
     members: Vec<u32>,
 }
 
 impl Resting {
     pub(super) fn new() -> Self {
-        Self {
-            tree: GrownTree::new(Simd::at_most(SimdLevel::in_use())),
-            workers: Workers::one(),
-            arrivals: Vec::new(),
-            len: 0,
-            is_built: false,
-            epoch: 1,
-            fresh: [0; 2],
-            excess: 0,
-            members: Vec::new(),
-        }
+        Self { tree: GrownTree::new(Simd::at_most(SimdLevel::in_use())), epoch: 1, ..Self::default() }
     }
 
     pub(super) fn len(&self) -> usize {
@@ -92,7 +78,7 @@ impl Resting {
     /// Puts the arrivals into the tree.
     pub(super) fn update(&mut self, slots: &Slots) -> Result<(), Error> {
         let boxes = slots.boxes();
-        let worn = self.excess > SORT_IN_NODES * self.len() as u64;
+        let worn = self.wear.excess() > SORT_IN_NODES * self.len() as u64;
         if self.arrivals.is_empty() && !worn && self.is_built || self.len() == 0 {
             return Ok(());
         }
@@ -105,15 +91,16 @@ impl Resting {
         self.arrivals.sort_unstable();
         let arrivals = std::mem::take(&mut self.arrivals);
         let is_built = std::mem::take(&mut self.is_built);
+        let one = Workers::one();
         if many || worn || !is_built || self.tree.tree.is_sparse(self.len) {
             self.members.clear();
             self.members.extend(slots.resting());
             let stats = SceneStats::of_members(boxes, &self.members);
-            (self.fresh, self.excess) = ([0; 2], 0);
-            self.tree.build(&self.workers, boxes, Members::Of(&self.members), &stats, None)?;
+            self.wear = Wear::default();
+            self.tree.build(&one, boxes, Members::Of(&self.members), &stats, None)?;
         } else {
-            self.tree.update(&self.workers, boxes, (arrivals.iter().copied(), 0), None, false)?;
-            self.tree.refit(&self.workers, boxes, std::iter::once(&arrivals[..]))?;
+            self.tree.update(&one, boxes, (arrivals.iter().copied(), 0), None, false)?;
+            self.tree.refit(&one, boxes, std::iter::once(&arrivals[..]))?;
         }
         self.is_built = true;
         self.arrivals = arrivals;
@@ -123,13 +110,6 @@ impl Resting {
 
     /// Calls `found` for each body whose box overlaps these bounds.
     pub(super) fn overlapping(&mut self, bounds: &Aabb, found: impl FnMut(u32)) {
-        let nodes = u64::from(self.tree.tree.overlapping(bounds, found));
-        let [looked, queries] = self.fresh;
-        if queries < FRESH {
-            self.fresh = [looked + nodes, queries + 1];
-        } else {
-            // Saturating: one query may look at fewer.
-            self.excess = (self.excess + nodes).saturating_sub(looked.div_ceil(FRESH));
-        }
+        self.wear.note(1, self.tree.tree.overlapping(bounds, found).into(), FRESH);
     }
 }

@@ -3,6 +3,7 @@
 use super::body::Body;
 use super::handle::Handle;
 use crate::aabb::Aabb;
+use crate::cpu::reserve;
 use crate::error::Error;
 
 /// Where a body is.
@@ -41,8 +42,8 @@ pub(super) struct Slots {
     slots: Vec<Slot>,
     boxes: Vec<Aabb>,
     bodies: Vec<Body>,
-    /// Slots without a body.
-    free: Vec<u32>,
+    /// Slots without a body. The last one is used first.
+    pub(super) free: Vec<u32>,
     /// Slots of removed bodies whose pairs have not ended yet.
     leaving: Vec<u32>,
     /// Slots to which something was done since the last update, each once.
@@ -64,11 +65,10 @@ impl Slots {
         if u32::try_from(most).is_err() {
             return Err(Error::TooManyObjects { objects: most });
         }
-        let refused = |_| Error::OutOfMemory { what: "bodies", elements: most };
-        self.slots.try_reserve(room).map_err(refused)?;
-        self.boxes.try_reserve(room).map_err(refused)?;
-        self.bodies.try_reserve(room).map_err(refused)?;
-        self.changed.try_reserve(more).map_err(refused)
+        reserve(&mut self.slots, room, "bodies")?;
+        reserve(&mut self.boxes, room, "bodies")?;
+        reserve(&mut self.bodies, room, "bodies")?;
+        reserve(&mut self.changed, more, "bodies")
     }
 
     /// Returns the slot of a handle.
@@ -211,17 +211,6 @@ impl Slots {
             *of = Slot { generation: of.generation.checked_add(1).unwrap_or(1), at: At::Free, done: 0, ..*of };
             self.free.push(slot);
         }
-    }
-
-    /// Returns the slots without a body. The last one is used first.
-    #[cfg(feature = "serde")]
-    pub(super) fn free_slots(&self) -> &[u32] {
-        &self.free
-    }
-
-    #[cfg(feature = "serde")]
-    pub(super) fn set_free_slots(&mut self, free: Vec<u32>) {
-        self.free = free;
     }
 
     /// Exchanges the boxes of resting bodies with those at the last update, and back at the next call.

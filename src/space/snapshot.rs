@@ -80,7 +80,7 @@ impl Snapshot {
         let resting = space.pairs[..links.len()].iter().map(|(a, b)| (a.slot(), b.slot()));
         Self {
             slots: (0..now.boxes().len() as u32).map(slot).collect(),
-            free: now.free_slots().to_vec(),
+            free: now.free.clone(),
             pairs: resting.chain(before.iter().copied().map(slots)).collect(),
             begun: space.begun.clone(),
             ended: space.ended.clone(),
@@ -95,7 +95,7 @@ impl Snapshot {
         for slot in &self.slots {
             space.slots.push(slot.generation);
         }
-        space.slots.set_free_slots(self.free()?);
+        space.slots.free = self.free()?;
         if let Some(slot) = self.slots.iter().position(|slot| slot.generation == 0) {
             return Err(format!("slot {slot} has the generation 0; the first is 1"));
         }

@@ -186,14 +186,14 @@ impl Space {
 
     /// Compares the pairs with those of the previous update.
     fn compare(&mut self) -> Result<(), Error> {
-        let Self { slots, keys, before, begun_keys, ended_keys, pairs, begun, ended, .. } = self;
-        begun_keys.clear();
-        ended_keys.clear();
-        differences(keys, before, begun_keys, ended_keys)?;
-        let handles = |&key: &u64| handles(slots, key);
-        begun.extend(begun_keys.iter().map(handles));
-        ended.extend(ended_keys.iter().map(handles));
-        pairs.extend(keys.iter().map(handles));
+        let Self { slots, keys, before, pairs, begun, ended, .. } = self;
+        let handles = |key| handles(slots, key);
+        if let Err(error) = differences(keys, before, handles, begun, ended) {
+            begun.clear();
+            ended.clear();
+            return Err(error);
+        }
+        pairs.extend(keys.iter().copied().map(handles));
         std::mem::swap(keys, before);
         Ok(())
     }

@@ -1,8 +1,9 @@
 //! Finds where the cheapest algorithm changes along a line of loads.
 
-use super::AlgorithmCost;
+use super::{AlgorithmCost, Crossover};
 use crate::algorithm::Load;
 use crate::cost::Frame;
+use crate::stats::NORMAL_90;
 
 /// Distance between two loads that are compared, as a logarithm of objects. A narrower field may be missed.
 const FINEST_LN: f64 = 0.03;
@@ -52,7 +53,7 @@ impl<'a> Slice<'a> {
     /// The number of objects at which a condition begins to hold, upwards or downwards from `objects`; the end of the
     /// slice if it never does. Steps that double find a load at which it holds and may step over a short stretch;
     /// halving the last step finds where it begins.
-    pub(super) fn reach(&self, objects: f64, upwards: bool, holds: impl Fn(&Load) -> bool) -> f64 {
+    fn reach(&self, objects: f64, upwards: bool, holds: impl Fn(&Load) -> bool) -> f64 {
         let (start, end) = (self.place(objects), if upwards { self.last() } else { 0.0 });
         let (mut not_yet, mut at, mut step) = (start, start, 0.05);
         while !holds(&self.load(at)) {
@@ -76,7 +77,7 @@ impl<'a> Slice<'a> {
     pub(super) fn steps(&self, costs: &[AlgorithmCost]) -> Vec<(Load, usize)> {
         let mut steps = Vec::new();
         let Some(first) = self.loads.first() else { return steps };
-        let Some((cheapest_here, least)) = cheapest(costs, first) else { return steps };
+        let Some((cheapest_here, least)) = cheapest(costs, first, |_| true) else { return steps };
         // Of those that cost about the same the first, which has the fewest threads.
         let holds = |best: usize, other: usize, load: &Load, least: f64| {
             let same_method = costs[best].algorithm.method() == costs[other].algorithm.method();
@@ -93,7 +94,7 @@ impl<'a> Slice<'a> {
             for part in 1..=parts {
                 let place = (k - 1) as f64 + f64::from(part) / f64::from(parts);
                 let load = self.load(place);
-                let Some((other, least)) = cheapest(costs, &load) else { return steps };
+                let Some((other, least)) = cheapest(costs, &load, |_| true) else { return steps };
                 if !holds(best, other, &load, least) {
                     // Back to the last place at which the other one was not cheaper.
                     let not_cheaper = |load: &Load| costs[other].curve.cost_ns(load) >= costs[best].curve.cost_ns(load);
@@ -107,6 +108,28 @@ impl<'a> Slice<'a> {
             }
         }
         steps
+    }
+
+    /// The crossover of two algorithms whose fields meet at a number of objects. `spread` returns the standard deviation
+    /// of the logarithm of the ratio of the two costs.
+    pub(super) fn crossover(
+        &self,
+        below: &AlgorithmCost,
+        above: &AlgorithmCost,
+        objects: u32,
+        spread: impl Fn(&Load) -> f64,
+    ) -> Crossover {
+        let objects = f64::from(objects);
+        let doubt = |load: &Load| NORMAL_90 * spread(load);
+        // Positive if the algorithm of the upper field is cheaper.
+        let gain = |load: &Load| (below.curve.cost_ns(load) / above.curve.cost_ns(load)).ln();
+        Crossover {
+            below: below.algorithm.clone(),
+            above: above.algorithm.clone(),
+            objects,
+            low: Some(self.reach(objects, false, |load| gain(load) <= -doubt(load))),
+            high: Some(self.reach(objects, true, |load| gain(load) >= doubt(load))),
+        }
     }
 
     /// The first load between two places at which `above` is cheaper than `below`.
@@ -137,11 +160,11 @@ fn note(steps: &mut Vec<(Load, usize)>, load: Load, best: usize) {
     }
 }
 
-/// Position and cost of the cheapest.
-fn cheapest(costs: &[AlgorithmCost], load: &Load) -> Option<(usize, f64)> {
+/// Returns position and cost of the cheapest of those that are usable.
+pub(super) fn cheapest(costs: &[AlgorithmCost], load: &Load, usable: impl Fn(usize) -> bool) -> Option<(usize, f64)> {
     let frame = Frame::new(load);
-    let all = costs.iter().enumerate().map(|(k, cost)| (k, cost.curve.cost_of(&frame)));
-    all.min_by(|a, b| a.1.total_cmp(&b.1))
+    let usable = costs.iter().enumerate().filter(|&(k, _)| usable(k));
+    usable.map(|(k, cost)| (k, cost.curve.cost_of(&frame))).min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Interpolates between two loads.
@@ -176,7 +199,7 @@ mod tests {
             let mut worse_since = None;
             while place <= slice.last() {
                 let load = slice.load(place);
-                let (_, least) = cheapest(&costs, &load).unwrap();
+                let (_, least) = cheapest(&costs, &load, |_| true).unwrap();
                 // The choice may cost 2 % more, and anything along 3 % of the objects.
                 worse_since = (costs[at(load.objects)].curve.cost_ns(&load) > 1.021 * least)
                     .then(|| worse_since.unwrap_or(load.objects));

@@ -1,3 +1,5 @@
+pub(super) mod drawn;
+
 use super::*;
 use crate::tuning::{CostTerm, Term};
 
@@ -60,7 +62,7 @@ fn a_slice_through_no_load_leaves_sound_tuning() {
         vec![cost("brute@cpu1", &[(Term::AllPairs, 1.0)], 0.05), cost("sap@cpu1", &[(Term::Objects, 100.0)], 0.05)];
     let tuning = Tuning::from_costs(Source::Predicted, "uniform", costs, &[]);
     assert!(tuning.steps.is_empty() && tuning.defect().is_none());
-    assert_eq!(tuning.rank(&Load::of_objects(1000), |_| true).unwrap().best, 1);
+    assert_eq!(tuning.cheapest(&Load::of_objects(1000), |_| true).unwrap().0, 1);
     assert_eq!(Tuning { costs: Vec::new(), ..tuning }.defect(), Some(TuningError::NoFirstStep));
 }
 
@@ -89,7 +91,7 @@ fn an_algorithm_that_never_wins_has_no_step() {
 }
 
 #[test]
-fn rank_respects_what_is_usable() {
+fn cheapest_is_one_of_the_usable() {
     let costs = vec![
         cost("a@cpu1", &[(Term::Call, 3.0)], 0.0),
         cost("b@cpu1", &[(Term::Call, 1.0)], 0.0),
@@ -97,9 +99,9 @@ fn rank_respects_what_is_usable() {
     ];
     let tuning = Tuning::from_costs(Source::Measured, "uniform", costs, &loads());
     let load = Load::default();
-    assert_eq!(tuning.rank(&load, |_| true), Some(Ranking { best: 1, best_ns: 1.0, runner_up: Some((2, 2.0)) }));
-    assert_eq!(tuning.rank(&load, |k| k != 1), Some(Ranking { best: 2, best_ns: 2.0, runner_up: Some((0, 3.0)) }));
-    assert_eq!(tuning.rank(&load, |_| false), None);
+    assert_eq!(tuning.cheapest(&load, |_| true), Some((1, 1.0)));
+    assert_eq!(tuning.cheapest(&load, |k| k != 1), Some((2, 2.0)));
+    assert_eq!(tuning.cheapest(&load, |_| false), None);
 }
 
 #[test]

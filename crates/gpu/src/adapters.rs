@@ -201,13 +201,14 @@ impl Found {
 /// `wgpu::Device::adapter_info`.
 #[must_use]
 pub fn identity(index: u32, info: &wgpu::AdapterInfo) -> GpuIdentity {
-    let driver = format!("{} {}", info.driver, info.driver_info);
-    let device = format!("{:04x}:{:04x}", info.vendor, info.device);
-    GpuIdentity::new(index, info.name.clone(), kind(info.device_type)).with_driver(
-        device,
-        driver.trim(),
-        info.backend.to_str(),
-    )
+    GpuIdentity {
+        index,
+        name: info.name.clone(),
+        device: format!("{:04x}:{:04x}", info.vendor, info.device),
+        driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
+        api: info.backend.to_str().to_owned(),
+        kind: kind(info.device_type),
+    }
 }
 
 /// Returns whether `a` is the DX12 adapter of a card that also has a Vulkan one, which is preferred.

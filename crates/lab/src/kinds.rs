@@ -3,8 +3,8 @@
 use crate::data::host;
 use crate::report::{Label, Report};
 use sapwise::AlgorithmId;
-use sapwise::internals::stats::{median, quantile};
 use sapwise_tune::ParameterId;
+use sapwise_tune::stats::{median, quantile};
 use serde::Serialize;
 use std::collections::BTreeMap;
 

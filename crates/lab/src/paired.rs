@@ -3,7 +3,7 @@
 //! At each size the median over frames of `ln(first / second)` is taken: pairing frame by frame cancels what disturbed
 //! both.
 
-use sapwise::internals::stats::{NORMAL_90, mean, median, robust_deviation};
+use sapwise_tune::stats::{NORMAL_90, mean, median, robust_deviation};
 use std::collections::BTreeMap;
 
 /// Standard error of a median over that of a mean, for a normal distribution.

@@ -179,7 +179,8 @@ impl Machine {
 impl Gpu {
     fn hardware(&self, index: u32) -> GpuHardware {
         let name = format!("GPU of {} GFLOP/s", self.gflop);
-        let identity = GpuIdentity::new(index, name, self.kind).with_driver("0000:0000", "test", "vulkan");
+        let [device, driver, api] = ["0000:0000", "test", "vulkan"].map(str::to_owned);
+        let identity = GpuIdentity { device, driver, api, ..GpuIdentity::new(index, name, self.kind) };
         let figures = [
             (GpuParameterId::UploadRateGbPerS, self.upload),
             (GpuParameterId::DownloadRateGbPerS, self.download),

@@ -12,7 +12,7 @@ pub const FACTORS: [f64; 9] = [0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.
 #[must_use]
 pub fn predicted_ns(tuning: &Tuning, load: &Load) -> f64 {
     let counted = || f64::from(load.objects) + load.pairs;
-    tuning.rank(load, |_| true).map_or_else(counted, |r| r.best_ns).max(1.0)
+    tuning.cheapest(load, |_| true).map_or_else(counted, |(_, ns)| ns).max(1.0)
 }
 
 /// Returns the share of each rank with which all are predicted to take the same time. The sum is 1.

@@ -187,7 +187,7 @@ fn loaded(of: &str, parameters: &[Parameter]) -> Option<String> {
 fn moved(parameters: &[Parameter]) -> Option<String> {
     let distance = Parameter::find(parameters, ParameterId::CoreToCoreNs)?;
     // Cores of different groups differ by a factor of four; noise of the clock does not reach two.
-    let [low, high] = [0.1, 0.9].map(|q| sapwise::internals::stats::quantile(&distance.raw, q));
+    let [low, high] = [0.1, 0.9].map(|q| crate::stats::quantile(&distance.raw, q));
     let (low, high) = low.zip(high).filter(|(low, high)| *high > 2.0 * low)?;
     Some(format!(
         "a cache line took {low:.0} ns from core to core in some samples and {high:.0} ns in others: the program or \

@@ -27,6 +27,8 @@ pub mod json;
 #[cfg(feature = "measure")]
 pub mod measure;
 pub mod model;
+#[doc(hidden)]
+pub mod stats;
 
 #[cfg(feature = "measure")]
 pub use calibrate::{StartOptions, for_this_machine};

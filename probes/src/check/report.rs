@@ -4,10 +4,10 @@ use super::{Finding, Here, privacy};
 use crate::gpus::{difference, uses};
 use crate::{date, revisions};
 use sapwise::algorithm::SimdLevel;
-use sapwise::internals::stats::median;
 use sapwise_lab::report::{Label, Point, Report};
 use sapwise_tune::hardware::ParameterId;
 use sapwise_tune::measure::Watch;
+use sapwise_tune::stats::median;
 use sapwise_tune::{GpuHardware, Hardware};
 
 /// Several threads may be up to this factor faster than their number, by a clock that rises between two measurements.

@@ -95,7 +95,8 @@ mod tests {
     use super::*;
 
     fn gpu(index: u32, kind: GpuKind) -> GpuIdentity {
-        GpuIdentity::new(index, "X", kind).with_driver("1:2", "d 1", "vulkan")
+        let [device, driver, api] = ["1:2", "d 1", "vulkan"].map(str::to_owned);
+        GpuIdentity { device, driver, api, ..GpuIdentity::new(index, "X", kind) }
     }
 
     #[test]

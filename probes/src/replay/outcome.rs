@@ -2,9 +2,9 @@
 
 use super::samples::{Samples, windows};
 use sapwise::algorithm::Load;
-use sapwise::internals::stats::{median, quantile};
 use sapwise::{AlgorithmId, Reason};
 use sapwise_lab::figures::Replay;
+use sapwise_tune::stats::{median, quantile};
 use serde::Serialize;
 use std::ops::Range;
 

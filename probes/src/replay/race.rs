@@ -7,10 +7,10 @@ use super::samples::Samples;
 use crate::interrupt;
 use crate::progress::Progress;
 use anyhow::{Context, bail};
-use sapwise::internals::stats::median;
 use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Pairs, Reason, Registry, Tuning};
 use sapwise_scenes::Random;
 use sapwise_tune::measure::Watch;
+use sapwise_tune::stats::median;
 use std::time::Instant;
 
 /// An algorithm is not timed again at a frame when even the faster of two samples there is this many times the best:

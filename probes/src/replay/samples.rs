@@ -1,6 +1,6 @@
 //! The times of an algorithm at a frame, and the least time that switching between algorithms could reach.
 
-use sapwise::internals::stats::median;
+use sapwise_tune::stats::median;
 
 /// Frames of a window. An incremental algorithm rebuilds every few dozen frames; an oracle that chose for every frame
 /// alone would run it in its cheap frames and leave it for its rebuilds.

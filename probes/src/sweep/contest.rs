@@ -3,8 +3,8 @@
 //! A probe decides between the best. One that is far behind gets the few samples that its cost curve needs; two that
 //! are close get samples until it is clear which is faster, or that it does not matter.
 
-use sapwise::internals::stats::{median, relative_iqr};
 use sapwise_lab::sweep::median as median_ns;
+use sapwise_tune::stats::{median, relative_iqr};
 
 /// Fewest frames before anything is decided.
 pub(super) const FEW_FRAMES: usize = 5;

@@ -1,7 +1,8 @@
 //! All pairs of a few dozen boxes.
 
 use super::floats::Floats;
-use super::{Level, Query, View, at_level};
+use super::rows::{Query, View};
+use super::{Level, at_level};
 use crate::cpu::columns::Columns;
 use crate::cpu::level::Simd;
 use crate::pairs::Pairs;

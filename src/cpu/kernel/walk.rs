@@ -43,6 +43,11 @@ impl<W, F: Fn(usize, usize) -> W + Copy> MarksOf<W> for F {}
 /// Returns nothing to test.
 fn unmarked(_level: usize, _node: usize) {}
 
+/// Returns the memberships to test.
+fn marked(marks: &[Vec<Marks>]) -> impl MarksOf<&Marks> {
+    |level, node| &marks[level][node]
+}
+
 /// Leaves whose pairs with others behind them are found in another way.
 #[derive(Debug)]
 pub(crate) struct Apart {
@@ -67,30 +72,27 @@ impl Walk<'_> {
         by: impl FnOnce() -> Membership,
         found: impl FnMut(usize),
     ) -> u32 {
-        match self.marks {
-            None => self.each_wanted(simd, b, unmarked, &(), found),
-            Some(marks) => self.each_wanted(simd, b, |level, node| &marks[level][node], &by(), found),
-        }
-    }
-
-    #[inline]
-    fn each_wanted<W: Wanted>(
-        &self,
-        simd: Simd,
-        b: &Aabb,
-        marks: impl MarksOf<W>,
-        by: &W::Query,
-        found: impl FnMut(usize),
-    ) -> u32 {
-        let (walk, query, every, leaves) = (self, (b, by), 0..usize::MAX, 0);
-        at_level!(simd, [W: Wanted] [W] Walk::each(
+        let walk = self;
+        at_level!(simd, [] [] Walk::each_overlapping_at(
             walk: &Walk<'_>,
-            query: (&Aabb, &W::Query),
-            every: Range<usize>,
-            leaves: usize,
-            marks: impl MarksOf<W>,
+            b: &Aabb,
+            by: impl FnOnce() -> Membership,
             found: impl FnMut(usize),
         ) -> u32)
+    }
+
+    #[inline(always)]
+    fn each_overlapping_at<L: Level>(
+        &self,
+        b: &Aabb,
+        by: impl FnOnce() -> Membership,
+        found: impl FnMut(usize),
+        level: L,
+    ) -> u32 {
+        match self.marks {
+            None => self.each((b, &()), 0..usize::MAX, 0, unmarked, found, level),
+            Some(marks) => self.each((b, &by()), 0..usize::MAX, 0, marked(marks), found, level),
+        }
     }
 
     /// Adds the pairs of the boxes in these leaves with each other and with those in all leaves behind.
@@ -98,26 +100,16 @@ impl Walk<'_> {
         if pairs.is_any_over() {
             return;
         }
-        match self.marks {
-            None => self.wanted_self_pairs(simd, leaves, unmarked, pairs),
-            Some(marks) => self.wanted_self_pairs(simd, leaves, |level, node| &marks[level][node], pairs),
-        }
+        let walk = self;
+        at_level!(simd, [] [] Walk::self_pairs_at(walk: &Walk<'_>, leaves: Range<usize>, pairs: &mut Pairs));
     }
 
-    fn wanted_self_pairs<W: Wanted>(
-        &self,
-        simd: Simd,
-        leaves: Range<usize>,
-        marks: impl MarksOf<W>,
-        pairs: &mut Pairs,
-    ) {
-        let walk = self;
-        at_level!(simd, [W: Wanted] [W] Walk::leaves_with_all_behind(
-            walk: &Walk<'_>,
-            leaves: Range<usize>,
-            marks: impl MarksOf<W>,
-            pairs: &mut Pairs,
-        ));
+    #[inline(always)]
+    fn self_pairs_at<L: Level>(&self, leaves: Range<usize>, pairs: &mut Pairs, level: L) {
+        match self.marks {
+            None => self.leaves_with_all_behind(leaves, unmarked, pairs, level),
+            Some(marks) => self.leaves_with_all_behind(leaves, marked(marks), pairs, level),
+        }
     }
 
     /// Adds the pairs of the boxes of a group with those in the leaves.
@@ -125,28 +117,15 @@ impl Walk<'_> {
         if pairs.is_any_over() {
             return;
         }
-        let Some(marks) = self.marks else { return self.wanted_pairs_with(simd, group, (), unmarked, pairs) };
-        let of_group = pairs.screen().map_or(Marks::ALL, |screen| Marks::of(&group.ids, &screen.filter));
-        self.wanted_pairs_with(simd, group, &of_group, |level, node| &marks[level][node], pairs);
+        let walk = self;
+        at_level!(simd, [] [] Walk::pairs_with_at(walk: &Walk<'_>, group: &Group, pairs: &mut Pairs));
     }
 
-    fn wanted_pairs_with<W: Wanted>(
-        &self,
-        simd: Simd,
-        group: &Group,
-        of_group: W,
-        marks: impl MarksOf<W>,
-        pairs: &mut Pairs,
-    ) {
-        let by = of_group.query_all();
-        let walk = self;
-        let group = &Side { node: &group.node, bounds: &group.bounds, ids: &group.ids, marks: of_group, by: &by };
-        at_level!(simd, [W: Wanted] [W] Walk::group_with_all(
-            walk: &Walk<'_>,
-            group: &Side<'_, W>,
-            marks: impl MarksOf<W>,
-            pairs: &mut Pairs,
-        ));
+    #[inline(always)]
+    fn pairs_with_at<L: Level>(&self, group: &Group, pairs: &mut Pairs, level: L) {
+        let Some(marks) = self.marks else { return self.group_with_all(group, (), unmarked, pairs, level) };
+        let of_group = pairs.screen().map_or(Marks::ALL, |screen| Marks::of(&group.ids, &screen.filter));
+        self.group_with_all(group, &of_group, marked(marks), pairs, level);
     }
 
     #[inline(always)]
@@ -189,13 +168,16 @@ impl Walk<'_> {
     #[inline(always)]
     fn group_with_all<W: Wanted, L: Level>(
         &self,
-        group: &Side<'_, W>,
+        group: &Group,
+        of_group: W,
         marks: impl MarksOf<W>,
         pairs: &mut Pairs,
         simd: L,
     ) {
-        let meet = |other| self.meet(group, other, marks, pairs, simd);
-        self.each((group.bounds, group.by), 0..usize::MAX, 1, marks, meet, simd);
+        let by = of_group.query_all();
+        let side = Side { node: &group.node, bounds: &group.bounds, ids: &group.ids, marks: of_group, by: &by };
+        let meet = |other| self.meet(&side, other, marks, pairs, simd);
+        self.each((&group.bounds, &by), 0..usize::MAX, 1, marks, meet, simd);
     }
 
     /// Adds the pairs of the boxes of a node with those of a leaf.

@@ -1,8 +1,9 @@
 //! What AVX2 and AVX-512 do in another way than other levels.
 
+use super::Level;
 use super::contain::BLOCK;
 use super::node::LANES;
-use super::{Level, View};
+use super::rows::View;
 use crate::aabb::Aabb;
 use crate::cpu::level::{Avx2, Avx512};
 use crate::pair::Pair;

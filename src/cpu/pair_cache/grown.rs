@@ -14,7 +14,7 @@ use std::ops::Range;
 pub(super) const NOTHING: Aabb = Aabb::new([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
 
 /// Every box grown by a margin, in the order of the input.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Grown {
     boxes: Vec<Aabb>,
     len: usize,
@@ -57,7 +57,7 @@ pub(super) struct Changes {
 
 impl Grown {
     pub(super) fn new(simd: Simd) -> Self {
-        Self { boxes: Vec::new(), len: 0, dirty: Vec::new(), memberships: Vec::new(), simd }
+        Self { simd, ..Self::default() }
     }
 
     pub(super) fn as_slice(&self) -> &[Aabb] {

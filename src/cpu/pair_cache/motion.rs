@@ -8,6 +8,7 @@ mod tests;
 use super::grown::{Changes, Margin};
 use super::prices::Prices;
 use crate::aabb::Aabb;
+use crate::cpu::tree::Wear;
 use crate::load::{Displacement, FramePlan, is_same_pace};
 use mean_work::MeanWork;
 use std::ops::Range;
@@ -37,7 +38,7 @@ const JUMP: f32 = 0.5;
 /// Boxes that leave a sorted tree, as a share of all and at least, from which it is learned how many nodes a query
 /// looks at.
 const FRESH: f32 = 0.02;
-const FEWEST_FRESH: f32 = 64.0;
+const FEWEST_FRESH: u64 = 64;
 
 /// Frames over which grown boxes that are too wide are made smaller.
 const SHRINKING: usize = 64;
@@ -91,11 +92,8 @@ struct Keeping {
     kept: f32,
     /// Nodes looked at for each box that left, averaged in the same way.
     nodes: f32,
-    /// Nodes looked at, and the boxes that left, in the first frames after all boxes were sorted.
-    fresh: [f32; 2],
-    /// What looking at more nodes than then has cost for each box since. It is worth a new order when it has cost as
-    /// much as that does (the ski-rental bound).
-    excess: f32,
+    /// Of the tree. A new order is worth it when the excess has cost as much as that does (the ski-rental bound).
+    wear: Wear,
     /// The first box that still has a grown box that is too wide.
     wide_from: Option<usize>,
     /// The margin that the grown boxes have in the mean, and what half of it would have saved for each box since it
@@ -108,6 +106,11 @@ struct Keeping {
 }
 
 impl Keeping {
+    /// What the wear of the tree has cost for each of so many boxes.
+    fn excess(&self, objects: usize) -> f32 {
+        cost::nodes(cost::far(objects), self.wear.excess() as f32) / objects.max(1) as f32
+    }
+
     /// Half the margin of the grown boxes.
     fn narrower(&self) -> f32 {
         (0.5 * self.grown).max(MARGINS[0])
@@ -210,17 +213,18 @@ impl Motion {
     /// Whether tree and pairs are made again in this frame, in which boxes left as `changes` says.
     pub(super) fn wants_rebuild(&self, objects: usize, changes: &Changes) -> bool {
         let Some(keeping) = self.keeping else { return false };
-        changes.left as f32 > JUMP * objects as f32 || keeping.excess > cost::rebuild(cost::far(objects), keeping.kept)
+        changes.left as f32 > JUMP * objects as f32
+            || keeping.excess(objects) > cost::rebuild(cost::far(objects), keeping.kept)
     }
 
     /// Whether the boxes in the tree are to be sorted anew, over some frames.
     pub(super) fn wants_renewal(&self, objects: usize) -> bool {
-        self.keeping.is_some_and(|k| k.excess > cost::renewal(cost::far(objects)))
+        self.keeping.is_some_and(|k| k.excess(objects) > cost::renewal(cost::far(objects)))
     }
 
     /// The boxes in the tree stand in a new order.
     pub(super) fn renewed(&mut self) {
-        self.keeping.iter_mut().for_each(|k| (k.fresh, k.excess) = ([0.0; 2], 0.0));
+        self.keeping.iter_mut().for_each(|k| k.wear = Wear::default());
     }
 
     /// Returns the boxes whose grown boxes are made smaller in this frame. When the margin is too wide they all are, a
@@ -276,14 +280,9 @@ impl Motion {
         k.leaving += if k.frames > 0 { (outgrown - k.leaving) / LEARNING } else { 0.0 };
         if rebuilt {
             (k.grown, k.missed, k.wide_from) = (k.margin.share, 0.0, None);
-            (k.fresh, k.excess) = ([0.0; 2], 0.0);
+            k.wear = Wear::default();
         } else {
-            if share(k.fresh[1] as usize) < FRESH || k.fresh[1] < FEWEST_FRESH {
-                k.fresh = [k.fresh[0] + did.nodes as f32, k.fresh[1] + changes.left as f32];
-            } else {
-                let more = cost::left(far, nodes) - cost::left(far, k.fresh[0] / k.fresh[1]);
-                k.excess = (k.excess + more * left).max(0.0);
-            }
+            k.wear.note(changes.left as u64, did.nodes, FEWEST_FRESH.max((FRESH * objects as f32) as u64));
             k.grown += (k.margin.share - k.grown) * left.min(1.0);
             k.nodes += if changes.left > 0 { (nodes - k.nodes) / LEARNING } else { 0.0 };
             k.missed = (k.missed + k.narrower_saves(far, kept, outgrown)).max(0.0);
@@ -340,8 +339,7 @@ impl Motion {
             leaving: cost::leaving(motion, best),
             kept,
             nodes: NODES,
-            fresh: [0.0; 2],
-            excess: 0.0,
+            wear: Wear::default(),
             wide_from: None,
             grown: best,
             missed: 0.0,

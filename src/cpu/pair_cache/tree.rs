@@ -5,7 +5,7 @@
 
 use super::grown::NOTHING;
 use crate::aabb::Aabb;
-use crate::cpu::columns::{ensure, part};
+use crate::cpu::columns::{ensure, part, split};
 use crate::cpu::kernel::node::LANES;
 use crate::cpu::level::Simd;
 use crate::cpu::sort::sort;
@@ -20,7 +20,7 @@ use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 const SMALLEST_SPLIT: usize = 1024;
 
 /// See the module.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct GrownTree {
     /// Also of other boxes than grown ones, while their places are not asked for.
     pub(crate) tree: Tree,
@@ -38,15 +38,7 @@ pub(crate) struct GrownTree {
 
 impl GrownTree {
     pub(crate) fn new(simd: Simd) -> Self {
-        Self {
-            tree: Tree::new(simd),
-            place_of: Vec::new(),
-            out: Vec::new(),
-            keys: Vec::new(),
-            moved: 0,
-            scratch: Vec::new(),
-            widened: Vec::new(),
-        }
+        Self { tree: Tree::new(simd), ..Self::default() }
     }
 
     pub(crate) fn reserve(&mut self, objects: usize) -> Result<(), Error> {
@@ -130,12 +122,7 @@ impl GrownTree {
         let workers = if self.moved < SMALLEST_SPLIT { &workers.fit(0) } else { workers };
         ensure(&mut self.keys, self.moved, "boxes that moved")?;
         let keys = &mut self.keys[..self.moved];
-        let mut rest = &mut *keys;
-        let parts = moved.map(|moved| {
-            let (part, behind) = std::mem::take(&mut rest).split_at_mut(moved.len());
-            rest = behind;
-            (part, moved)
-        });
+        let parts = split(keys, moved.clone().map(<[u32]>::len)).zip(moved);
         let place_of = &self.place_of;
         workers.each_of(parts, |(keys, moved)| {
             for (key, &id) in keys.iter_mut().zip(moved) {

@@ -7,7 +7,6 @@ use crate::aabb::Aabb;
 use crate::cpu::kernel::distance::Distance;
 use crate::cpu::kernel::ray::Cast;
 use crate::filter::Membership;
-use crate::ray::Ray;
 use std::collections::BinaryHeap;
 
 /// A box near a point. The nearest is the least; of two at the same distance it is the one with the lower id.
@@ -49,24 +48,18 @@ impl Tree {
         self.walk().each_overlapping(self.simd, bounds, by, |place| found(self.ids[place]))
     }
 
-    /// Calls `found` with the id of every box that a valid ray meets, and the `t` at which it enters the box: 0 if it
-    /// begins there. Boxes are closed: a ray meets a box that it touches, and one in whose face it lies.
-    ///
-    /// `found` returns how far the search goes on: never beyond [`Ray::max`] or a value that it returned before. If it
-    /// returns the given `t`, no farther box follows, and the last one is the first hit. If it returns infinity, all
-    /// boxes follow; if a negative number, none. Nearer nodes come first, but not every nearer box.
-    ///
-    /// On each axis, the times of entry and exit are `(bound - origin) × (1 / direction)` in `f32`; the box is met if
-    /// no entry is later than an exit. Boxes that are only reached beyond [`f32::MAX`] are not met.
-    #[inline]
-    pub fn cast_ray(&self, ray: &Ray, found: impl FnMut(u32, f32) -> f32) {
-        self.cast_box(&Aabb::new(ray.origin, ray.origin), ray.direction, ray.max, found);
-    }
-
     /// Calls `found` with the id of every box that a valid box meets when it moves by `t × motion`, and the least such
-    /// `t` from 0 to `max`: 0 for boxes that it [overlaps](Aabb::overlaps) at the start. All else is as for
-    /// [`cast_ray`](Self::cast_ray), with the origin zero and the bounds `min - b.max` and `max - b.min` of the met
-    /// box. Components of `motion` must be finite, and may all be zero.
+    /// `t` from 0 to `max`: 0 for boxes that it [overlaps](Aabb::overlaps) at the start. A ray is a box without extent.
+    /// Boxes are closed: a ray meets a box that it touches, and one in whose face it lies. Components of `motion` must
+    /// be finite, and may all be zero.
+    ///
+    /// `found` returns how far the search goes on: never beyond `max` or a value that it returned before. If it returns
+    /// the given `t`, no farther box follows, and the last one is the first hit. If it returns infinity, all boxes
+    /// follow; if a negative number, none. Nearer nodes come first, but not every nearer box.
+    ///
+    /// On each axis, the times of entry and exit are `(min - b.max) × (1 / motion)` and `(max - b.min) × (1 / motion)`
+    /// in `f32`, with the bounds of the met box; it is met if no entry is later than an exit. Boxes that are only
+    /// reached beyond [`f32::MAX`] are not met.
     #[inline]
     pub fn cast_box(&self, b: &Aabb, motion: [f32; 3], max: f32, mut found: impl FnMut(u32, f32) -> f32) {
         let found = |place: usize, t| found(self.ids[place], t);

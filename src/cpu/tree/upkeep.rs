@@ -23,7 +23,7 @@ const MOST_PAUSE: u32 = 64;
 const NO_CLOCK: f64 = 1.0;
 
 /// See the module.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Upkeep {
     /// About the tree that the previous call left. `None`: it can't be refitted.
     tree: Option<Known>,
@@ -59,18 +59,7 @@ fn each_ns(since: Instant, boxes: usize) -> f64 {
 impl Upkeep {
     /// `timed`: measured times decide, and not areas alone.
     pub(crate) fn new(timed: bool) -> Self {
-        let [build, refit, search] = [MeanTime::default(); 3];
-        Self {
-            tree: None,
-            pause: 0,
-            next_pause: 0,
-            build,
-            refit,
-            search,
-            timed,
-            #[cfg(test)]
-            builds: 0,
-        }
+        Self { timed, ..Self::default() }
     }
 
     /// Returns the number of trees that were built.

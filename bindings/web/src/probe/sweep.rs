@@ -2,7 +2,7 @@
 
 use crate::clock::milliseconds;
 use sapwise::algorithm::{Displacement, Entry, Load};
-use sapwise::internals::stats::median;
+use sapwise_tune::stats::median;
 use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Pairs, Registry};
 use sapwise_scenes::{Random, Scenario};
 use serde_json::{Value, json};

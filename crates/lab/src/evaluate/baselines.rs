@@ -3,11 +3,11 @@
 use super::regret_table::{NOT_TIMED, Strategy};
 use crate::data::{COMPARED, COMPARED_OF_GPUS, Profile, figure};
 use sapwise::algorithm::BackendClass;
-use sapwise::internals::stats;
 use sapwise::tuning::AlgorithmCost;
 use sapwise::{AlgorithmId, Tuning};
 use sapwise_tune::Hardware;
 use sapwise_tune::model::GPU_PREFIX;
+use sapwise_tune::stats;
 
 /// Always chooses the algorithm with the least mean regret over the training profiles, each of which comes with the
 /// regret of always choosing each of its algorithms and counts the same.
@@ -43,7 +43,7 @@ pub(super) fn frozen<'a>(last: u32, above: &str, available: &[AlgorithmId]) -> S
 pub fn by_costs(costs: Vec<AlgorithmCost>, available: &[AlgorithmId]) -> Strategy<'_> {
     let tuning = Tuning::from_costs(sapwise::tuning::Source::Measured, "", costs, &[]);
     Box::new(move |load| {
-        let best = tuning.rank(load, |k| closest(&tuning.costs[k].algorithm, available).is_some())?.best;
+        let (best, _) = tuning.cheapest(load, |k| closest(&tuning.costs[k].algorithm, available).is_some())?;
         closest(&tuning.costs[best].algorithm, available)
     })
 }

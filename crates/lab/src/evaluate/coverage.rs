@@ -2,8 +2,8 @@
 
 use crate::data::Profile;
 use crate::training::Coverage;
-use sapwise::internals::stats::{mean, quantile};
 use sapwise::tuning::AlgorithmCost;
+use sapwise_tune::stats::{mean, quantile};
 use std::collections::BTreeMap;
 
 /// The share of times that an interval should hold.

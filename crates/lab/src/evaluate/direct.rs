@@ -12,9 +12,9 @@ use linfa_linear::LinearRegression;
 use ndarray::{Array1, Array2, Axis};
 use sapwise::AlgorithmId;
 use sapwise::algorithm::BackendClass;
-use sapwise::internals::stats::mean;
 use sapwise_tune::Hardware;
 use sapwise_tune::hardware::ParameterId;
+use sapwise_tune::stats::mean;
 
 /// Parameters whose logarithms a crossover is regressed on. Few, because there are only as many rows as reports.
 const PARAMETERS: [&str; 4] = [

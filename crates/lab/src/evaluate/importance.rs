@@ -6,8 +6,8 @@ use crate::data::{Profile, figure};
 use anyhow::Result;
 use ndarray::{Array2, Axis};
 use rayon::prelude::*;
-use sapwise::internals::stats::mean;
 use sapwise_scenes::Random;
+use sapwise_tune::stats::mean;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Permutations of each parameter, and their seed.

@@ -4,7 +4,7 @@ use crate::data::{Profile, Spot};
 use crate::spread::range;
 use sapwise::AlgorithmId;
 use sapwise::algorithm::Load;
-use sapwise::internals::stats::mean;
+use sapwise_tune::stats::mean;
 use std::collections::BTreeMap;
 
 /// Chooses an algorithm of a machine for a load; `None` if it knows none of them.

@@ -4,7 +4,7 @@ use super::regret_table::Regret;
 use crate::data::Profile;
 use crate::spread::range;
 use crate::training::{MethodScore, Regrets, Split};
-use sapwise::internals::stats::{self, median};
+use sapwise_tune::stats::{self, median};
 use std::collections::BTreeMap;
 
 /// The strategy whose gap to the best choice others close.

@@ -71,7 +71,7 @@ fn thinned(ns: &[f64]) -> Vec<(f64, f64)> {
     let step = ns.len().div_ceil(MOST_POINTS).max(1);
     let mean = |(k, chunk): (usize, &[f64])| {
         let known: Vec<f64> = chunk.iter().copied().filter(|ns| ns.is_finite()).collect();
-        (!known.is_empty()).then(|| ((k * step) as f64, sapwise::internals::stats::mean(&known) / 1e3))
+        (!known.is_empty()).then(|| ((k * step) as f64, sapwise_tune::stats::mean(&known) / 1e3))
     };
     ns.chunks(step).enumerate().filter_map(mean).collect()
 }

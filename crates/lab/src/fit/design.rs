@@ -14,13 +14,13 @@ use anyhow::Result;
 use ndarray::{Array1, Array2, ShapeBuilder};
 use sapwise::AlgorithmId;
 use sapwise::algorithm::{Backend, BackendClass};
-use sapwise::internals::stats::robust_deviation;
 use sapwise::internals::{Fallback, Places, Work};
 use sapwise_scenes::Random;
 use sapwise_tune::hardware::ParameterId;
 use sapwise_tune::model::{
     FallbackModel, GroupResidual, HelpersModel, MethodModel, ModelTerm, PredictError, ThreadFigures,
 };
+use sapwise_tune::stats::robust_deviation;
 use sapwise_tune::{GpuKind, Hardware};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;

@@ -9,9 +9,9 @@ use ndarray::{Array1, Array2, Axis, s};
 use rayon::prelude::*;
 use sapwise::algorithm::Load;
 use sapwise::internals::Places;
-use sapwise::internals::stats::robust_deviation;
 use sapwise_scenes::Random;
 use sapwise_tune::model::GroupResidual;
+use sapwise_tune::stats::robust_deviation;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

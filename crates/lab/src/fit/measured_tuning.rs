@@ -107,7 +107,7 @@ mod tests {
             let profile = Profile::of("", &report);
             let mut regret = 0.0;
             for spot in &profile.points {
-                let chosen = &tuning.costs[tuning.rank(&spot.load, |_| true).unwrap().best].algorithm;
+                let chosen = &tuning.costs[tuning.cheapest(&spot.load, |_| true).unwrap().0].algorithm;
                 let ns = profile.medians(spot).find(|m| m.0 == chosen).expect("chose one that had left the race").1;
                 regret += ns / spot.best().unwrap() - 1.0;
             }
@@ -115,7 +115,7 @@ mod tests {
             assert!(regret < 0.02, "{}: {regret}", machine.name);
             for objects in [200_000.0, 1e6, 8e6] {
                 for scenario in ["uniform", "clustered"] {
-                    let best = tuning.rank(&load(scenario, objects), |_| true).unwrap().best;
+                    let best = tuning.cheapest(&load(scenario, objects), |_| true).unwrap().0;
                     assert_ne!(tuning.costs[best].algorithm.method(), "brute");
                 }
             }
@@ -139,7 +139,7 @@ mod tests {
         }
         let tuning = measured_tuning(&report, "uniform", None).unwrap();
         for point in report.points.iter().filter(|p| from(p)) {
-            let chosen = &tuning.costs[tuning.rank(&point.load, |_| true).unwrap().best].algorithm;
+            let chosen = &tuning.costs[tuning.cheapest(&point.load, |_| true).unwrap().0].algorithm;
             assert_ne!(chosen.to_string(), "grid-sap@cpu2", "{:?}", point.load);
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::fit::nnls::nnls;
 use ndarray::{Array1, Array2};
-use sapwise::internals::stats::robust_deviation;
+use sapwise_tune::stats::robust_deviation;
 
 /// Times and the terms that should add up to them.
 #[derive(Debug, Clone)]

@@ -2,10 +2,10 @@
 
 use sapwise::AlgorithmId;
 use sapwise::algorithm::Load;
-use sapwise::internals::stats::median;
 use sapwise::tuning::Term;
 use sapwise_tune::Hardware;
 use sapwise_tune::model::Scale;
+use sapwise_tune::stats::median;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -8,8 +8,8 @@ use crate::figures::{Matrix, Ratios};
 use crate::report::Label;
 use anyhow::Result;
 use sapwise::AlgorithmId;
-use sapwise::internals::stats::mean;
 use sapwise_tune::GpuHardware;
+use sapwise_tune::stats::mean;
 use std::collections::BTreeMap;
 
 /// Points that two hosts must share for a speed-up.

@@ -6,8 +6,8 @@ use crate::figures::{Curve, CurvePanel, Curves, Field};
 use crate::fit::slice_tuning;
 use anyhow::Result;
 use sapwise::algorithm::{Backend, BackendClass};
-use sapwise::internals::stats::{mean, median};
 use sapwise::{AlgorithmId, Tuning};
+use sapwise_tune::stats::{mean, median};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Hosts in one figure at most.

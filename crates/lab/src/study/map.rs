@@ -8,9 +8,9 @@ use anyhow::{Result, ensure};
 use rayon::prelude::*;
 use sapwise::Aabb;
 use sapwise::algorithm::Load;
-use sapwise::internals::stats::median;
 use sapwise::tuning::AlgorithmCost;
 use sapwise_scenes::Random;
+use sapwise_tune::stats::median;
 
 /// Cells on either axis.
 const ACROSS: usize = 24;

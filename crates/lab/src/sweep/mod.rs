@@ -17,5 +17,5 @@ pub const WARM_UP: usize = 24;
 #[must_use]
 pub fn median(samples: &[u64]) -> Option<f64> {
     let samples: Vec<f64> = samples.iter().map(|&ns| ns as f64).collect();
-    sapwise::internals::stats::median(&samples)
+    sapwise_tune::stats::median(&samples)
 }

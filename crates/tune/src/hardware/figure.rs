@@ -1,7 +1,7 @@
 //! One parameter of a machine: its value and origin.
 
 use super::{HardwareError, Statistic};
-use sapwise::internals::stats;
+use crate::stats;
 use sapwise::named;
 
 /// One parameter of a machine: its value and origin.

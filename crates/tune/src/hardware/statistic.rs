@@ -1,6 +1,6 @@
 //! How a value follows from its samples.
 
-use sapwise::internals::stats;
+use crate::stats;
 use sapwise::named;
 
 named! {

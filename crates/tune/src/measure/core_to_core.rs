@@ -12,7 +12,7 @@ use core_affinity::CoreId;
 
 use super::Options;
 use crate::hardware::{Parameter, ParameterId};
-use sapwise::internals::stats;
+use crate::stats;
 
 /// Exchanges before those that count: by then both threads run.
 const WARM_UP: u32 = 200;

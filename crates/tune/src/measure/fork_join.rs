@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::Options;
 use crate::hardware::{Parameter, ParameterId};
-use sapwise::internals::stats::median;
+use crate::stats::median;
 use sapwise::internals::{Threads, Workers};
 
 /// Body of a warm phase: many times the cost of a start.

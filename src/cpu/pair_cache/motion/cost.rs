@@ -38,7 +38,12 @@ pub(super) fn tests(far: f32, kept: f32) -> f32 {
 
 /// The cost of a box that left when this many nodes are looked at for each.
 pub(super) fn left(far: f32, nodes: f32) -> f32 {
-    far * (LEFT[0] + LEFT[1] * nodes)
+    far * LEFT[0] + self::nodes(far, nodes)
+}
+
+/// The cost of looking at this many nodes of the tree.
+pub(super) fn nodes(far: f32, nodes: f32) -> f32 {
+    far * LEFT[1] * nodes
 }
 
 /// How many times as much a look at a node of the tree costs than in a small scene: with the number of objects the tree

@@ -1,18 +1,18 @@
 //! Random costs for tests.
 
-use super::{AlgorithmCost, CostCurve, CostTerm, Term};
 use crate::algorithm::Load;
-use crate::cost::{Places, Residual};
+use crate::cost::{Places, Residual, Work};
 use crate::splitmix;
+use crate::tuning::{AlgorithmCost, CostCurve, CostTerm, Term};
 use std::sync::Arc;
 
 /// Draws from 0 to 1.
-pub(super) fn draw(state: &mut u64) -> f64 {
+pub(crate) fn draw(state: &mut u64) -> f64 {
     (splitmix::next(state) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 /// Random curves of many terms with residuals, and loads whose motion falls while the objects rise.
-pub(super) fn drawn(seed: u64) -> (Vec<AlgorithmCost>, Vec<Load>) {
+pub(crate) fn drawn(seed: u64) -> (Vec<AlgorithmCost>, Vec<Load>) {
     let load = |k: i32| {
         let n = 10.0_f64.powf(f64::from(k) / 4.0).round();
         let strip_candidates = 3.0 * n.powf(1.2);
@@ -34,7 +34,8 @@ pub(super) fn drawn(seed: u64) -> (Vec<AlgorithmCost>, Vec<Load>) {
         ];
         let weights = (0..places.loads().len()).map(|_| 0.4 * draw(&mut state)).collect();
         let residual = Residual::new(Arc::clone(&places), weights, false);
-        let curve = CostCurve::new(terms).with_cache(1e6).with_residual(residual);
+        let work = Arc::new(Work { cache_bytes: 1e6, ..Work::new(terms) });
+        let curve = CostCurve { residual: Some(residual), ..CostCurve::of(work) };
         AlgorithmCost { algorithm: format!("m{k}@cpu1").parse().unwrap(), revision: 1, curve, spread_ln: 0.1 }
     });
     let costs = costs.collect();
