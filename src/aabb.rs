@@ -127,8 +127,9 @@ impl Aabb {
     /// Returns an error for the first invalid box. `first` is the position of the first of `boxes`.
     #[doc(hidden)]
     pub fn check(boxes: &[Self], first: usize) -> Result<(), Error> {
-        let invalid = boxes.iter().zip(first..).find_map(|(b, index)| Some((index, b.defect()?)));
-        invalid.map_or(Ok(()), |(index, defect)| Err(Error::InvalidBox { index, defect }))
+        let invalid = boxes.iter().position(|b| b.defect().is_some());
+        let error = |at: usize| Some(Error::InvalidBox { index: first + at, defect: boxes[at].defect()? });
+        invalid.and_then(error).map_or(Ok(()), Err)
     }
 }
 

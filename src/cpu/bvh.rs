@@ -67,12 +67,11 @@ mod tests {
     #[test]
     fn tree_is_kept_while_boxes_move_little_and_rebuilt_when_they_jump() {
         let builds = |scenario: Scenario| {
-            let workers = Workers::new("bvh", 1, &Threads::default()).unwrap();
             let (mut tree, mut upkeep) = (Tree::new(Simd::Portable), Upkeep::new(false));
             let mut scene = Scene::start(scenario, 2000, 1);
             (0..100).for_each(|_| {
                 let boxes = scene.boxes();
-                upkeep.update(&mut tree, &workers, boxes, || FramePlan::default().stats(boxes), None).unwrap();
+                upkeep.update(&mut tree, &Workers::one(), boxes, || FramePlan::default().stats(boxes), None).unwrap();
                 scene.advance();
             });
             upkeep.builds()

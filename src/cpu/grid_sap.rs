@@ -180,12 +180,7 @@ impl Bins {
         let strips = grid.strips();
         ensure(&mut self.starts, strips + 1, "strips")?;
         ensure(&mut self.spans, share.len(), "boxes in strips")?;
-        // The axes are constants in each of the three calls, so that no index is computed.
-        let any_apart = match grid.axis {
-            0 => self.count::<0>(grid, share, first, screen)?,
-            1 => self.count::<1>(grid, share, first, screen)?,
-            _ => self.count::<2>(grid, share, first, screen)?,
-        };
+        let any_apart = self.count(grid, share, first, screen)?;
         self.apart.clear();
         let most = (MOST_BOXES / threads).max(MOST_OF_SHARE) as u32;
         if any_apart || self.starts[..strips].iter().any(|&count| count > most) {
@@ -219,7 +214,7 @@ impl Bins {
     }
 
     /// Finds the strips of each box and counts the boxes of each bin. Returns whether any box goes into the tree.
-    fn count<const AXIS: usize>(
+    fn count(
         &mut self,
         grid: &StripGrid,
         share: &[Aabb],
@@ -234,7 +229,7 @@ impl Bins {
                 return Err(Error::InvalidBox { index: k, defect });
             }
             let passive = screen.is_some_and(|s| s.is_passive(k));
-            *span = if passive { StripSpan::APART } else { grid.span::<AXIS>(b) };
+            *span = if passive { StripSpan::APART } else { grid.span(b) };
             any_apart |= *span == StripSpan::APART;
             grid.each_strip(*span, |strip, _| starts[strip] += 1);
         }

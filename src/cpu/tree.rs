@@ -23,7 +23,6 @@ use crate::cpu::kernel::node::{Group, LANES, Node};
 use crate::cpu::kernel::prefetch;
 use crate::cpu::kernel::walk::Walk;
 use crate::cpu::level::{Simd, SimdLevel};
-use crate::cpu::threads::Threads;
 use crate::cpu::workers::Workers;
 use crate::error::Error;
 use crate::filter::Screen;
@@ -110,8 +109,7 @@ impl Tree {
     /// [`Error::InvalidBox`] for the first invalid box, and [`Error::OutOfMemory`].
     pub fn of(boxes: &[Aabb]) -> Result<Self, Error> {
         let mut tree = Self::new(Simd::at_most(SimdLevel::in_use()));
-        let workers = Workers::new("tree", 1, &Threads::default())?;
-        tree.build(&workers, boxes, Members::From(0), &SceneStats::of(boxes), None)?;
+        tree.build(&Workers::one(), boxes, Members::From(0), &SceneStats::of(boxes), None)?;
         Ok(tree)
     }
 

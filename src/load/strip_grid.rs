@@ -95,11 +95,11 @@ impl StripGrid {
         [0, 1].map(|d| (bound(d, b.min[self.across[d]]), bound(d, b.max[self.across[d]])))
     }
 
-    /// Returns the strips of a box. `AXIS` is the sweep axis of the grid.
+    /// Returns the strips of a box.
     #[inline(always)]
-    pub fn span<const AXIS: usize>(&self, b: &Aabb) -> StripSpan {
-        let [u, v] = [(AXIS + 1) % 3, (AXIS + 2) % 3];
-        let large = (b.max[AXIS] - b.min[AXIS] > self.large[0])
+    pub fn span(&self, b: &Aabb) -> StripSpan {
+        let (axis, [u, v]) = (self.axis, self.across);
+        let large = (b.max[axis] - b.min[axis] > self.large[0])
             | (b.max[u] - b.min[u] > self.large[1])
             | (b.max[v] - b.min[v] > self.large[2]);
         let bounds = [b.min[u], b.min[v], b.max[u], b.max[v]];
@@ -193,7 +193,7 @@ mod tests {
         for low in bounds {
             for high in bounds.into_iter().filter(|&h| h >= low) {
                 let b = Aabb::new([1.0, low, low * 0.5], [2.0, high, high * 0.5]);
-                let span = grid.span::<0>(&b);
+                let span = grid.span(&b);
                 let strips = strips(&grid, span);
                 let cells = [0, 1].map(|d| cell(&grid, d, b.min[1 + d])..=cell(&grid, d, b.max[1 + d]));
                 let [columns, rows] = &cells;

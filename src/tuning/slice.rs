@@ -110,8 +110,8 @@ impl<'a> Slice<'a> {
         steps
     }
 
-    /// The crossover of two algorithms whose fields meet at a number of objects. `spread` returns the standard deviation
-    /// of the logarithm of the ratio of the two costs.
+    /// The crossover of two algorithms whose fields meet at this number of objects. `spread` returns the standard
+    /// deviation of the logarithm of the ratio of the two costs.
     pub(super) fn crossover(
         &self,
         below: &AlgorithmCost,

@@ -106,7 +106,7 @@ struct Keeping {
 }
 
 impl Keeping {
-    /// What the wear of the tree has cost for each of so many boxes.
+    /// Returns what the wear of the tree has cost for each box.
     fn excess(&self, objects: usize) -> f32 {
         cost::nodes(cost::far(objects), self.wear.excess() as f32) / objects.max(1) as f32
     }

@@ -1,6 +1,5 @@
 use super::*;
 use crate::cpu::level::Simd;
-use crate::cpu::threads::Threads;
 use crate::cpu::tree::Members;
 use crate::cpu::workers::Workers;
 use crate::load::SceneStats;
@@ -51,11 +50,10 @@ impl Random {
 fn trees(random: &mut Random, len: usize, churn: bool) -> (Vec<Tree>, Vec<Option<Aabb>>) {
     let mut boxes: Vec<Aabb> = (0..len).map(|_| random.aabb()).collect();
     (0..len / 10).for_each(|k| boxes[2 * k + 1] = boxes[2 * k]);
-    let workers = Workers::new("test", 1, &Threads::default()).unwrap();
     let mut trees: Vec<Tree> = Simd::every().map(Tree::new).collect();
     let mut present: Vec<Option<Aabb>> = boxes.iter().copied().map(Some).collect();
     for tree in &mut trees {
-        tree.build(&workers, &boxes, Members::From(0), &SceneStats::of(&boxes), None).unwrap();
+        tree.build(&Workers::one(), &boxes, Members::From(0), &SceneStats::of(&boxes), None).unwrap();
     }
     if churn {
         let gone: Vec<usize> = (0..len).filter(|k| k % 3 == 0 || (len / 4..len / 2).contains(k)).collect();
