@@ -6,6 +6,7 @@ pub use crate::entry::Entry;
 pub use crate::load::{Displacement, FramePlan, Load, Motion};
 pub use crate::registry::{AlgorithmSource, usable_cores};
 
+use crate::described::described;
 use std::fmt;
 use std::str::FromStr;
 
@@ -28,16 +29,18 @@ pub enum Backend {
     Gpu(Vec<u32>),
 }
 
-/// The class of a processor. A method has one cost model and one revision in each class.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub enum BackendClass {
-    /// Threads of the CPU.
-    #[default]
-    Cpu,
-    /// One or more GPUs.
-    Gpu,
+described! {
+    /// The class of a processor. A method has one cost model and one revision in each class.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+    #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+    pub enum BackendClass {
+        /// Threads of the CPU.
+        #[default]
+        Cpu = "CPU",
+        /// One or more GPUs.
+        Gpu = "GPU",
+    }
 }
 
 /// The most threads of an algorithm.
@@ -112,15 +115,6 @@ impl Backend {
             Self::Cpu(threads) => *threads,
             Self::Gpu(gpus) => u32::try_from(gpus.len()).unwrap_or(u32::MAX),
         }
-    }
-}
-
-impl fmt::Display for BackendClass {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Cpu => "CPU",
-            Self::Gpu => "GPU",
-        })
     }
 }
 

@@ -52,6 +52,7 @@ mod changes;
 mod clock;
 mod cost;
 mod cpu;
+mod described;
 mod entry;
 pub mod error;
 mod filter;

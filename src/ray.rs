@@ -1,6 +1,6 @@
 //! The ray, a query of a scene.
 
-use std::fmt;
+use crate::described::described;
 
 /// A ray, or the segment of one: the points `origin + t × direction` with `0 <= t <= max`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,14 +14,16 @@ pub struct Ray {
     pub max: f32,
 }
 
-/// What makes a ray invalid.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum RayDefect {
-    /// The origin or the direction has a component that is NaN or infinite, or the maximum is NaN.
-    NotFinite,
-    /// The direction is zero.
-    NoDirection,
+described! {
+    /// What makes a ray invalid.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    #[non_exhaustive]
+    pub enum RayDefect {
+        /// The origin or the direction has a component that is NaN or infinite, or the maximum is NaN.
+        NotFinite = "has an origin or direction that is not finite, or a maximum that is not a number (NaN)",
+        /// The direction is zero.
+        NoDirection = "has the direction zero",
+    }
 }
 
 impl Ray {
@@ -39,15 +41,6 @@ impl Ray {
         } else {
             (self.direction == [0.0; 3]).then_some(RayDefect::NoDirection)
         }
-    }
-}
-
-impl fmt::Display for RayDefect {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::NotFinite => "has an origin or direction that is not finite, or a maximum that is not a number (NaN)",
-            Self::NoDirection => "has the direction zero",
-        })
     }
 }
 
