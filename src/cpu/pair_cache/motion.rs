@@ -1,7 +1,6 @@
 //! Whether keeping pairs pays, and with which margin.
 
 mod cost;
-mod mean_work;
 #[cfg(test)]
 mod tests;
 
@@ -10,7 +9,6 @@ use super::prices::Prices;
 use crate::aabb::Aabb;
 use crate::cpu::tree::Wear;
 use crate::load::{Displacement, FramePlan, is_same_pace};
-use mean_work::MeanWork;
 use std::ops::Range;
 
 /// Margins that are compared, as shares of a mean edge.
@@ -42,6 +40,9 @@ const FEWEST_FRESH: u64 = 64;
 
 /// Frames over which grown boxes that are too wide are made smaller.
 const SHRINKING: usize = 64;
+
+/// Frames for which the promised cost counts in the mean cost of a frame.
+const PROMISED: f32 = 16.0;
 
 /// Frames after which keeping has paid: when it ceases to, that is because the scene changed.
 const PROVEN: u32 = 256;
@@ -102,7 +103,9 @@ struct Keeping {
     missed: f32,
     /// Frames since keeping began.
     frames: u32,
-    work: MeanWork,
+    /// Cost for each box in the last frame, and in the mean frame, rebuilds included.
+    work: f32,
+    mean_work: f32,
 }
 
 impl Keeping {
@@ -207,7 +210,7 @@ impl Motion {
 
     /// Work of the last frame in which pairs were kept, over that of the mean one.
     pub(super) fn work_over_mean(&self) -> f32 {
-        self.keeping.map_or(1.0, |k| k.work.last / k.work.mean())
+        self.keeping.map_or(1.0, |k| k.work / k.mean_work)
     }
 
     /// Whether tree and pairs are made again in this frame, in which boxes left as `changes` says.
@@ -274,7 +277,8 @@ impl Motion {
         k.tests = cost::tests(far, kept);
         let now = k.tests + work;
         k.cost += (now - k.cost) / 16.0;
-        k.work.add(now, rebuilt);
+        k.work = now;
+        k.mean_work += (now - k.mean_work) / (PROMISED + k.frames as f32).min(LEARNING);
         k.kept += (kept - k.kept) / LEARNING;
         // Boxes that move alike leave together, in frames in which all is made again.
         k.leaving += if k.frames > 0 { (outgrown - k.leaving) / LEARNING } else { 0.0 };
@@ -344,7 +348,8 @@ impl Motion {
             grown: best,
             missed: 0.0,
             frames: 0,
-            work: MeanWork::promised(cost(best)),
+            work: cost(best),
+            mean_work: cost(best),
         })
     }
 }
