@@ -2,14 +2,10 @@
 //! rapier3d; and the boxes of their colliders in a [`Space`](sapwise::Space), whose pairs are compared with those of
 //! rapier's own broad phase in every step.
 //!
-//! [`World`] is the simulation, [`Comparison`] runs Sapwise beside it and compares the pairs of both, and [`Recording`]
-//! keeps the boxes for a file that `sapwise run` and `sapwise pairs` read.
+//! [`World`] is the simulation; [`Comparison`] runs Sapwise beside it and compares the pairs of both.
 
 mod comparison;
-mod random;
-mod recording;
 mod world;
 
 pub use comparison::{Comparison, Counts, Mismatch};
-pub use recording::Recording;
 pub use world::{Settings, World};

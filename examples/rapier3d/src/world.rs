@@ -1,7 +1,7 @@
 //! The simulation: cubes that fall, collide, break into eight and are cleared away.
 
-use crate::random::Random;
 use rapier3d::prelude::*;
+use sapwise_scenes::Random;
 use std::collections::{HashSet, VecDeque};
 
 /// Steps in which the number of bodies runs from few to many and back.
@@ -83,7 +83,7 @@ impl World {
         // Pieces get smaller until the whole cubes can be as many bodies as there may be.
         let most = |generations: &u32| WHOLE << (3 * generations) >= settings.bodies;
         let generations = (1..8).find(most).unwrap_or(8);
-        Self { physics, settings, random: Random(settings.seed), cubes: VecDeque::new(), generations, step: 0 }
+        Self { physics, settings, random: Random::new(settings.seed), cubes: VecDeque::new(), generations, step: 0 }
     }
 
     /// What rapier knows.
@@ -111,7 +111,7 @@ impl World {
             let mut broken = Vec::new();
             let mut room = (self.settings.bodies - self.cubes.len()) / 7;
             self.cubes.retain(|cube| {
-                let due = hard.contains(&cube.body) || burst && self.random.chance(0.25);
+                let due = hard.contains(&cube.body) || burst && within(&mut self.random, 0.0, 1.0) < 0.25;
                 let breaks = due && room > 0 && cube.generation < self.generations;
                 room -= usize::from(breaks);
                 if breaks {
@@ -155,9 +155,9 @@ impl World {
         self.clear_to(self.settings.bodies - count);
         for k in 0..count {
             let side = PIT - 2.0 * HALF;
-            let x = self.random.within(-side, side);
-            let z = self.random.within(-side, side);
-            let turn = [(); 3].map(|()| self.random.within(-1.0, 1.0));
+            let x = within(&mut self.random, -side, side);
+            let z = within(&mut self.random, -side, side);
+            let turn = [(); 3].map(|()| within(&mut self.random, -1.0, 1.0));
             let body = RigidBodyBuilder::dynamic()
                 .translation(Vector::new(x, 4.0 + 3.5 * HALF * k as f32, z))
                 .rotation(Vector::from(turn))
@@ -178,15 +178,16 @@ impl World {
         let half = cube.half / 2.0;
         for octant in octants() {
             let arm = *whole.rotation() * (octant * half);
-            let velocity =
-                whole.linvel() + whole.angvel().cross(arm) + arm.normalize() * (APART * self.random.within(0.5, 1.5));
+            let velocity = whole.linvel()
+                + whole.angvel().cross(arm)
+                + arm.normalize() * (APART * within(&mut self.random, 0.5, 1.5));
             let body = RigidBodyBuilder::dynamic()
                 .pose(Pose::from_parts(whole.translation() + arm, *whole.rotation()))
                 .linvel(velocity)
                 .angvel(whole.angvel());
             let edge = half * SHRUNK;
             let smallest = cube.generation + 1 == self.generations;
-            let groups = if smallest && self.random.chance(DEBRIS) {
+            let groups = if smallest && within(&mut self.random, 0.0, 1.0) < DEBRIS {
                 InteractionGroups::new(Group::GROUP_2, !Group::GROUP_2, InteractionTestMode::And)
             } else {
                 InteractionGroups::all()
@@ -211,4 +212,9 @@ impl World {
 fn octants() -> impl Iterator<Item = Vector> {
     let side = |corner: u8, bit: u8| if corner >> bit & 1 == 1 { 1.0 } else { -1.0 };
     (0..8).map(move |corner| Vector::new(side(corner, 0), side(corner, 1), side(corner, 2)))
+}
+
+/// Draws uniformly from `low` to `high`.
+fn within(random: &mut Random, low: f32, high: f32) -> f32 {
+    low + (high - low) * ((random.bits() >> 40) as f32 / (1_u64 << 24) as f32)
 }
