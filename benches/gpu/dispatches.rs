@@ -1,10 +1,11 @@
 //! Where the time of a frame goes: timestamps on the GPU after each dispatch, clocks on the CPU around each stage.
 
-use sapwise::{Aabb, Pairs};
-use sapwise_gpu::kernel::Kernel;
+use sapwise::Pairs;
 use sapwise_gpu::watch::Place;
 use sapwise_gpu::{Gpu, Gpus, Resident, broad_phase, wgpu30 as wgpu};
 use sapwise_scenes::Scenario;
+use sapwise_tune::GpuParameterId;
+use sapwise_tune::measure::Options;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -14,18 +15,6 @@ const MARKS: u32 = 256;
 /// Frames of one method at one size, and the time after which no more begin.
 const FRAMES: usize = 40;
 const TIME: Duration = Duration::from_secs(2);
-
-/// Bytes of the copy that measures the bandwidth of the GPU's memory.
-const COPIED: u64 = 256 << 20;
-
-/// Dispatches of the kernel that measures what a dispatch takes.
-const EMPTY: u32 = 64;
-
-/// Bytes that a thread copies into mapped memory at once.
-const CHUNK: usize = 64 << 10;
-
-/// Threads that copy into mapped memory and out of it.
-const THREADS: [usize; 5] = [1, 2, 4, 8, 16];
 
 /// The part in which a submission ends.
 const AFTER: &str = "copies after";
@@ -122,65 +111,6 @@ impl Clock {
             .chunks_exact(8)
             .map(|b| u64::from_ne_bytes(b.try_into().unwrap_or_default()) as f64 * period)
             .collect())
-    }
-
-    /// Returns the median time between two timestamps around some commands, in seconds.
-    fn time(&self, mut record: impl FnMut(&mut wgpu::CommandEncoder)) -> Result<f64, String> {
-        let mut seconds = Vec::new();
-        for _ in 0..9 {
-            let mut encoder = self.plain.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            encoder.write_timestamp(&self.queries, 0);
-            record(&mut encoder);
-            encoder.write_timestamp(&self.queries, 1);
-            self.plain.wait(self.plain.queue().submit([encoder.finish()])).map_err(|e| e.to_string())?;
-            let times = self.read(2)?;
-            seconds.push(times[1] - times[0]);
-        }
-        Ok(median(&mut seconds))
-    }
-
-    /// Returns the bytes per second that a copy in the GPU's memory reads and writes.
-    fn bandwidth(&self) -> Result<f64, String> {
-        let size = self.plain.limits().max_storage_buffer_binding_size.min(COPIED);
-        let text = "@group(0) @binding(0) var<storage, read> a: array<vec4u>;\n\
-            @group(0) @binding(1) var<storage, read_write> b: array<vec4u>;\n\
-            @compute @workgroup_size(256) fn copy(@builtin(workgroup_id) w: vec3u,\n\
-            @builtin(num_workgroups) n: vec3u, @builtin(local_invocation_index) t: u32) {\n\
-            let at = (w.y * n.x + w.x) * 256u + t; if (at < arrayLength(&b)) { b[at] = a[at]; } }";
-        let kernel = Kernel::compile(&self.plain, text.to_owned(), "copy", &[]).map_err(|e| e.to_string())?;
-        let [from, to] = [(); 2].map(|()| buffer(&self.plain, size, wgpu::BufferUsages::STORAGE));
-        let bound = kernel.bind(&self.plain, &[(0, &from), (1, &to)]).map_err(|e| e.to_string())?;
-        let seconds = self.time(|encoder| {
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            bound.dispatch(&mut pass, (size / 4096) as u32);
-        })?;
-        Ok(2.0 * size as f64 / seconds)
-    }
-
-    /// Returns the seconds of a dispatch of one workgroup that depends on the one before.
-    fn dispatch(&self) -> Result<f64, String> {
-        let text = "@group(0) @binding(0) var<storage, read_write> a: array<u32>;\n\
-            @compute @workgroup_size(64) fn touch(@builtin(global_invocation_id) id: vec3u) { a[id.x] += 1u; }";
-        let kernel = Kernel::compile(&self.plain, text.to_owned(), "touch", &[]).map_err(|e| e.to_string())?;
-        let words = buffer(&self.plain, 256, wgpu::BufferUsages::STORAGE);
-        let bound = kernel.bind(&self.plain, &[(0, &words)]).map_err(|e| e.to_string())?;
-        let all = self.time(|encoder| {
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            (0..EMPTY).for_each(|_| bound.dispatch(&mut pass, 1));
-        })?;
-        Ok(all / f64::from(EMPTY))
-    }
-
-    /// Returns the median wall time of a submission that does nothing, in seconds.
-    fn submission(&self) -> Result<f64, String> {
-        let mut seconds = Vec::new();
-        for _ in 0..EMPTY {
-            let start = Instant::now();
-            let submission = self.plain.submit(self.plain.record()).map_err(|e| e.to_string())?;
-            self.plain.wait(submission).map_err(|e| e.to_string())?;
-            seconds.push(start.elapsed().as_secs_f64());
-        }
-        Ok(median(&mut seconds))
     }
 }
 
@@ -284,61 +214,17 @@ fn by_name(frames: &[Parts]) -> Vec<(&'static str, u32, f64)> {
     names.into_iter().map(of).collect()
 }
 
-/// Prints how fast threads copy as many bytes as the boxes have into mapped memory and out of it, and the GPU between
-/// that memory and its own.
-fn transfers(clock: &Clock, boxes: &[Aabb]) -> Result<(), String> {
-    use wgpu::BufferUsages as U;
-    let gpu = &clock.plain;
-    let bytes = bytemuck::cast_slice::<Aabb, u8>(boxes);
-    let size = bytes.len() as u64;
-    let [up, down] = [U::MAP_WRITE | U::COPY_SRC, U::MAP_READ | U::COPY_DST].map(|usage| buffer(gpu, size, usage));
-    let inside = buffer(gpu, size, U::COPY_SRC | U::COPY_DST);
-    let to_gpu = clock.time(|encoder| encoder.copy_buffer_to_buffer(&up, 0, &inside, 0, size))?;
-    let from_gpu = clock.time(|encoder| encoder.copy_buffer_to_buffer(&inside, 0, &down, 0, size))?;
-    up.map_async(wgpu::MapMode::Write, .., |_| {});
-    down.map_async(wgpu::MapMode::Read, .., |_| {});
-    gpu.wait_all().map_err(|e| e.to_string())?;
-    let mut own = vec![0_u8; bytes.len()];
-    println!("\n{:.1} MB, µs\n\n| who | into | out of |\n|---|---|---|", size as f64 * 1e-6);
-    println!("| GPU | {:.0} | {:.0} |", to_gpu * 1e6, from_gpu * 1e6);
-    for threads in THREADS {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| e.to_string())?;
-        let each = bytes.len().div_ceil(threads).next_multiple_of(64);
-        let mut times = [Vec::new(), Vec::new()];
-        for _ in 0..9 {
-            let mut view = up.get_mapped_range_mut(..).map_err(|e| e.to_string())?;
-            let start = Instant::now();
-            let (chunks, _) = view.slice(..).into_chunks::<CHUNK>();
-            pool.in_place_scope(|scope| {
-                for (to, from) in chunks.into_iter().zip(bytes.chunks(CHUNK)) {
-                    scope.spawn(move |_| wgpu::WriteOnly::<[u8]>::from(to).copy_from_slice(from));
-                }
-            });
-            times[0].push(start.elapsed().as_secs_f64());
-            let view = down.get_mapped_range(..).map_err(|e| e.to_string())?;
-            let start = Instant::now();
-            pool.scope(|scope| {
-                for (to, from) in own.chunks_mut(each).zip(view.chunks(each)) {
-                    scope.spawn(move |_| to.copy_from_slice(from));
-                }
-            });
-            times[1].push(start.elapsed().as_secs_f64());
-        }
-        let [into, out] = times.map(|mut list| median(&mut list) * 1e6);
-        println!("| {threads} threads | {into:.0} | {out:.0} |");
-    }
-    Ok(())
-}
-
 /// Prints the tables of one GPU at these sizes.
 pub(super) fn print(gpus: &Gpus, index: u32, sizes: &[usize]) -> Result<(), String> {
     let clock = Clock::new(gpus, index)?;
-    let (bandwidth, dispatch) = (clock.bandwidth()?, clock.dispatch()?);
-    let submission = clock.submission()? * 1e6;
+    let measured = sapwise_tune::measure::gpu(gpus, index, &Options::default()).map_err(|e| e.to_string())?;
+    let value = |id: GpuParameterId| measured.value(id).ok_or_else(|| format!("{id} could not be measured"));
+    let (bandwidth, dispatch) = (value(GpuParameterId::CopyGbPerS)? * 1e9, value(GpuParameterId::DispatchNs)? * 1e-9);
     println!(
-        "\nA copy moves {:.0} GB/s, a dispatch takes {:.2} µs, an empty submission {submission:.1} µs.",
+        "\nA copy moves {:.0} GB/s, a dispatch takes {:.2} µs, a round trip {:.1} µs.",
         bandwidth * 1e-9,
-        dispatch * 1e6
+        dispatch * 1e6,
+        value(GpuParameterId::RoundTripNs)? * 1e-3
     );
     for &size in sizes {
         let scene = Scenario::Uniform.start(size, 1);
@@ -359,7 +245,6 @@ pub(super) fn print(gpus: &Gpus, index: u32, sizes: &[usize]) -> Result<(), Stri
             hosted[usize::from(watched)].find_pairs(boxes, &mut pairs).map_err(|e| e.to_string())?;
             Ok(pairs.len())
         })?;
-        transfers(&clock, boxes)?;
     }
     Ok(())
 }

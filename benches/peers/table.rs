@@ -99,8 +99,7 @@ fn by_scenario(points: &[Point], cell: impl Fn(&Point) -> Option<String>) -> Str
 /// All times of all points in milliseconds: one row for each contestant. Without slowest frames the last columns are
 /// empty.
 pub(crate) fn csv(results: &[(u32, Vec<Point>)]) -> String {
-    let mut text = "threads,scenario,objects,contestant,median_ms,quartile_1_ms,quartile_3_ms,frames,\
-        tail_p50_ms,tail_p99_ms,tail_worst_ms,tail_frames,tail_runs\n"
+    let mut text = "threads,scenario,objects,contestant,median_ms,quartile_1_ms,quartile_3_ms,frames,tail_p50_ms,tail_p99_ms,tail_worst_ms,tail_frames,tail_runs\n"
         .to_owned();
     for (threads, points) in results {
         for point in points {
