@@ -4,19 +4,8 @@ mod common;
 
 #[cfg(unix)]
 use common::send;
-use common::{failure, npy, sapwise, small_report, success, without_adapters};
+use common::{answer, failure, npy, sapwise, small_report, success, without_adapters};
 use std::fs;
-
-#[test]
-fn every_verb_has_help_with_an_example() {
-    let all = success(sapwise().arg("--help"));
-    for verb in ["predict", "devices", "probe", "run", "train", "study", "pairs", "check", "schema"] {
-        assert!(all.contains(verb), "{verb}");
-        let help = success(sapwise().args([verb, "--help"]));
-        assert!(help.contains("Example") && help.contains(&format!("sapwise {verb}")), "{verb}: {help}");
-    }
-    assert!(!all.contains("part"), "the hidden verb is shown: {all}");
-}
 
 #[test]
 fn wrong_usage_is_exit_status_two() {
@@ -52,8 +41,7 @@ fn a_wrong_simd_level_is_refused_by_every_verb() {
 
 #[test]
 fn devices_lists_algorithms_and_says_when_there_is_no_adapter() {
-    let json = success(without_adapters(&mut sapwise()).args(["devices", "--json"]));
-    let answer: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let answer = answer(without_adapters(&mut sapwise()).args(["devices", "--json"]));
     let algorithms = answer["algorithms"].as_array().unwrap();
     assert!(answer["adapters"].as_array().unwrap().is_empty());
     let brute = algorithms.iter().find(|a| a["id"] == "brute@cpu1").unwrap();
@@ -77,14 +65,8 @@ fn pairs_keeps_its_contract() {
     let boxes = npy(folder.path(), "boxes.npy", "<f4", "2, 4, 6", &[first, second].concat().concat());
     let out = folder.path().join("pairs.npy");
     for algorithm in ["brute@cpu1", "grid-sap@cpu1"] {
-        let text = success(
-            sapwise()
-                .arg("pairs")
-                .arg(&boxes)
-                .args(["--algorithm", algorithm, "--repeat", "3", "--json", "--out"])
-                .arg(&out),
-        );
-        let answer: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let words = ["--algorithm", algorithm, "--repeat", "3", "--json", "--out"];
+        let answer = answer(sapwise().arg("pairs").arg(&boxes).args(words).arg(&out));
         assert_eq!(answer["algorithm"], algorithm);
         assert_eq!((&answer["objects"], &answer["frames"]), (&4.into(), &2.into()));
         assert_eq!(answer["pairs"], serde_json::json!([2, 6]));
@@ -107,9 +89,8 @@ fn pairs_takes_no_and_one_box() {
     let folder = tempfile::tempdir().unwrap();
     for (shape, floats) in [("0, 6", 0), ("1, 6", 6), ("3, 0, 6", 0)] {
         let boxes = npy(folder.path(), "few.npy", "<f4", shape, &vec![0.0; floats]);
-        let text = success(sapwise().arg("pairs").arg(&boxes).arg("--json"));
-        let answer: serde_json::Value = serde_json::from_str(&text).unwrap();
-        assert!(answer["pairs"].as_array().unwrap().iter().all(|p| p == 0), "{shape}: {text}");
+        let answer = answer(sapwise().arg("pairs").arg(&boxes).arg("--json"));
+        assert!(answer["pairs"].as_array().unwrap().iter().all(|p| p == 0), "{shape}: {answer}");
     }
     let one = npy(folder.path(), "one.npy", "<f4", "1, 6", &[0.0; 6]);
     assert!(success(sapwise().arg("pairs").arg(&one)).contains(": 1 box, 1 frame\n"));
@@ -196,8 +177,7 @@ fn a_full_disk_is_a_failure_and_a_closed_pipe_is_none() {
 #[test]
 fn schema_writes_a_file_for_every_kind() {
     let folder = tempfile::tempdir().unwrap();
-    let told = success(sapwise().args(["schema", "--json", "--out"]).arg(folder.path().join("new")));
-    let told: serde_json::Value = serde_json::from_str(&told).unwrap();
+    let told = answer(sapwise().args(["schema", "--json", "--out"]).arg(folder.path().join("new")));
     assert_eq!(told["files"].as_array().unwrap().len(), 3);
     for name in ["report-3", "model-5", "tuning-3"] {
         let text = fs::read_to_string(folder.path().join("new").join(format!("{name}.schema.json"))).unwrap();

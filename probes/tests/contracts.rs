@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{failure, sapwise, small_report, success};
+use common::{answer, failure, sapwise, small_report};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -16,10 +16,6 @@ fn report(folder: &Path, name: &str, changes: &[(&str, Value)]) -> PathBuf {
     let path = folder.join(name);
     fs::write(&path, report.to_string()).unwrap();
     path
-}
-
-fn answer(command: &mut assert_cmd::Command) -> Value {
-    serde_json::from_str(&success(command)).unwrap()
 }
 
 fn assert_keys(value: &Value, keys: &[&str]) {

@@ -70,7 +70,7 @@ fn verbs() -> Vec<String> {
 fn every_example_and_every_next_command_works_as_printed() {
     let folder = folder();
     let verbs = verbs();
-    assert!(verbs.len() >= 9, "{verbs:?}");
+    assert!(verbs.len() == 9 && !verbs.contains(&"part".to_owned()), "{verbs:?}");
     for verb in verbs {
         let help = success(sapwise().args([&verb, "--help"]));
         let lines =

@@ -4,7 +4,7 @@ mod common;
 
 #[cfg(feature = "long-tests")]
 use common::failure;
-use common::{devices_with_a_gpu, npy, sapwise, success, without_adapters};
+use common::{answer, devices_with_a_gpu, npy, sapwise, success, tuning, without_adapters};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,10 +12,6 @@ use std::path::{Path, PathBuf};
 /// A sweep of one scenario with two sizes.
 #[cfg(feature = "long-tests")]
 const TINY: [&str; 6] = ["probe", "--scenario", "uniform", "--max-objects", "20", "--json"];
-
-fn answer(command: &mut assert_cmd::Command) -> Value {
-    serde_json::from_str(&success(command)).unwrap()
-}
 
 #[cfg(feature = "long-tests")]
 fn report(command: &mut assert_cmd::Command) -> sapwise_lab::Report {
@@ -177,15 +173,8 @@ fn measured_tuning_leaves_out_software_adapters() {
 #[test]
 fn tuning_for_a_missing_gpu_is_run_on_the_rest() {
     let folder = tempfile::tempdir().unwrap();
-    let step = |from: u32, id: &str| json!({"from_objects": from, "algorithm": id});
-    let tuning = json!({
-        "schema": "tuning/3", "source": "default", "model": null, "extrapolated": false,
-        "warnings": [], "scenario": "uniform",
-        "steps": [step(0, "brute@cpu1"), step(100, "grid-sap@gpu99")],
-        "crossovers": [], "interval_basis": "", "costs": []
-    });
     let path = folder.path().join("tuning.json");
-    fs::write(&path, tuning.to_string()).unwrap();
+    fs::write(&path, tuning(&[(0, "brute@cpu1"), (100, "grid-sap@gpu99")]).to_string()).unwrap();
     let complaint = String::from_utf8(sapwise().arg("check").arg(&path).output().unwrap().stdout).unwrap();
     assert!(complaint.contains("grid-sap@gpu99 can't run here: this machine has no gpu99"), "{complaint}");
     let run = ["run", "uniform", "--objects", "200", "--frames", "3", "--repeats", "1", "--json", "--tuning"];

@@ -8,7 +8,7 @@
 mod common;
 
 use common::{sapwise, small_report, success};
-use sapwise_scenes::Frames;
+use sapwise_scenes::{Frames, Random};
 use std::fs;
 #[cfg(unix)]
 use std::os::unix::fs::FileExt;
@@ -18,16 +18,6 @@ use std::time::Instant;
 
 /// How often each verb is killed without `SAPWISE_KILLS`.
 const KILLS: u64 = 4;
-
-/// Numbers from 0 to 1 that follow from the first.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-}
 
 /// Fails where a file of ours is half-written, or holds a part of what it is named for.
 fn check_whole(path: &Path) {
@@ -81,11 +71,10 @@ fn kill_and_look(words: &[&str], out: &Path, seed: u64) {
     assert!(!before.is_empty());
     end_files_early(words, out, &before);
     let kills = std::env::var("SAPWISE_KILLS").map_or(KILLS, |n| n.parse().expect("SAPWISE_KILLS is a number"));
-    let mut random = Random(seed);
-    random.next();
+    let mut random = Random::new(seed);
     for k in 0..kills {
         // Every other one near the end, where files are written.
-        let share = if k % 2 == 0 { random.next() } else { 0.8 + 0.25 * random.next() };
+        let share = if k % 2 == 0 { random.uniform() } else { 0.8 + 0.25 * random.uniform() };
         let mut command = Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
         command.env_remove("SAPWISE_SIMD").args(words).current_dir(out).stdout(Stdio::null()).stderr(Stdio::null());
         let mut running = command.spawn().unwrap();

@@ -4,25 +4,15 @@ mod common;
 
 #[cfg(unix)]
 use common::{TERMINATED, send};
-use common::{failure, npy, sapwise, success};
+use common::{answer, failure, npy, sapwise, success, tuning};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-fn answer(command: &mut assert_cmd::Command) -> Value {
-    serde_json::from_str(&success(command)).unwrap()
-}
-
 /// Tuning that run the first algorithm below that many objects and the second from there on.
 fn steps(folder: &Path, first: &str, crossover: u32, second: &str) -> PathBuf {
-    let step = |from: u32, id: &str| json!({"from_objects": from, "algorithm": id});
-    let tuning = json!({
-        "schema": "tuning/3", "source": "default", "model": null, "extrapolated": false,
-        "warnings": [], "scenario": "uniform",
-        "steps": [step(0, first), step(crossover, second)], "crossovers": [], "interval_basis": "", "costs": []
-    });
     let path = folder.join("steps.json");
-    fs::write(&path, tuning.to_string()).unwrap();
+    fs::write(&path, tuning(&[(0, first), (crossover, second)]).to_string()).unwrap();
     path
 }
 

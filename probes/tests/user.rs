@@ -9,7 +9,7 @@ mod common;
 mod own_algorithm;
 
 use assert_cmd::Command;
-use common::{failure, npy, sapwise, success};
+use common::{answer, failure, npy, sapwise, success};
 use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Pairs};
 use sapwise_cli::UserAlgorithm;
 use serde_json::Value;
@@ -137,14 +137,14 @@ fn from_the_probe_to_the_run_as_one_of_ours() {
     let tuning = file("tuning.json");
     let predict = |mut command: Command| {
         let words = ["predict", "--json", "--report"];
-        success(command.args(words).arg(&report).arg("--model").arg(&model).arg("--out").arg(&tuning))
+        answer(command.args(words).arg(&report).arg("--model").arg(&model).arg("--out").arg(&tuning))
     };
     // The plain command predicts the library's algorithms, and says what it can't choose.
-    let plain: Value = serde_json::from_str(&predict(sapwise())).unwrap();
+    let plain = predict(sapwise());
     assert!(!plain["costs"].to_string().contains("sweep"), "{plain}");
     let warned = names(&plain["warnings"]).iter().any(|w| w.contains("knows sweep, which is not in this build"));
     assert!(warned, "{}", plain["warnings"]);
-    let own: Value = serde_json::from_str(&predict(user())).unwrap();
+    let own = predict(user());
     assert!(own["costs"].as_array().unwrap().iter().any(|c| c["algorithm"] == "sweep@cpu1"), "{own}");
     assert!(!own["warnings"].to_string().contains("sweep"), "{}", own["warnings"]);
     // The built-in model does not know it.
@@ -152,7 +152,7 @@ fn from_the_probe_to_the_run_as_one_of_ours() {
     assert!(built_in.contains("sweep is not predicted") && built_in.contains("own-model.json"), "{built_in}");
 
     let run = ["run", "uniform", "--json", "--objects", "200", "--frames", "20", "--repeats", "1", "--tuning"];
-    let told: Value = serde_json::from_str(&success(user().args(run).arg(&tuning))).unwrap();
+    let told = answer(user().args(run).arg(&tuning));
     assert!(told["fixed"]["sweep@cpu1"]["total_ms"].as_f64().unwrap() > 0.0, "{told}");
     let complaint = failure(sapwise().args(run).arg(&tuning), 1);
     assert!(complaint.contains("is stale: sweep is not in this build"), "{complaint}");
@@ -193,7 +193,7 @@ fn the_pairs_are_those_of_ours() {
     for (path, frames) in few.into_iter().chain([(many, 4)]) {
         let pairs = |id: &str| -> Value {
             let words = ["--json", "--repeat", "3", "--algorithm", id];
-            serde_json::from_str(&success(user().arg("pairs").arg(&path).args(words))).unwrap()
+            answer(user().arg("pairs").arg(&path).args(words))
         };
         let (ours, own) = (pairs("brute@cpu1"), pairs("sweep@cpu1"));
         assert_eq!(ours["pairs"].as_array().unwrap().len(), frames);
@@ -215,8 +215,7 @@ fn boxes_that_ours_refuse_are_refused() {
 fn one_on_several_threads_gets_their_number() {
     let folder = tempfile::tempdir().unwrap();
     let boxes = npy(folder.path(), "one.npy", "<f4", "1, 6", &[0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
-    let told: Value =
-        serde_json::from_str(&success(program("threads").args(["devices", "--no-gpus", "--json"]))).unwrap();
+    let told = answer(program("threads").args(["devices", "--no-gpus", "--json"]));
     let ids = told["algorithms"].as_array().unwrap().iter().map(|a| a["id"].as_str().unwrap());
     let on = |method: &str| -> Vec<u32> {
         let id = |text: &str| text.parse::<AlgorithmId>().unwrap();
@@ -225,8 +224,7 @@ fn one_on_several_threads_gets_their_number() {
     assert!(!on("threads").is_empty() && on("threads") == on("brute"), "{told}");
     for threads in on("threads") {
         let words = ["--json", "--algorithm", &format!("threads@cpu{threads}")];
-        let told: Value =
-            serde_json::from_str(&success(program("threads").arg("pairs").arg(&boxes).args(words))).unwrap();
+        let told = answer(program("threads").arg("pairs").arg(&boxes).args(words));
         assert_eq!(told["pairs"][0], threads);
     }
 }

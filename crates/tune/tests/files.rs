@@ -57,14 +57,6 @@ fn damaged_files_are_refused_with_the_place() {
     assert!(!refused(&nested).is_empty());
 }
 
-#[test]
-fn old_files_are_refused_by_name() {
-    let model = json::model("{\"schema\": \"model/4\"}").unwrap_err().to_string();
-    let tuning = json::tuning("{\"schema\": \"tuning/2\"}").unwrap_err().to_string();
-    assert!(model.contains("\"model/4\"") && model.contains("`sapwise train REPORTS... --out MODEL.json`"), "{model}");
-    assert!(tuning.contains("\"tuning/2\"") && tuning.contains("`sapwise predict --out TUNING.json`"), "{tuning}");
-}
-
 /// A prediction of the built-in model for a machine of two cores, as a file.
 fn tuning_file() -> Value {
     let figure = |id: ParameterId| match id {

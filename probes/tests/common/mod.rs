@@ -3,7 +3,7 @@
 #![allow(dead_code, reason = "each test program uses a part of this")]
 
 use assert_cmd::Command;
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// The command, with no SIMD level from the environment of the tests.
@@ -44,7 +44,7 @@ pub(crate) fn without_adapters(command: &mut Command) -> &mut Command {
 /// The answer of `sapwise devices --json` on a machine with an adapter. Without any: `None`, with a line that says
 /// so, or a failure with `SAPWISE_REQUIRE_GPU=1`.
 pub(crate) fn devices_with_a_gpu(test: &str) -> Option<Value> {
-    let answer: Value = serde_json::from_str(&success(sapwise().args(["devices", "--json"]))).unwrap();
+    let answer: Value = answer(sapwise().args(["devices", "--json"]));
     if answer["adapters"].as_array().unwrap().is_empty() {
         let required = std::env::var("SAPWISE_REQUIRE_GPU").is_ok_and(|v| v == "1");
         assert!(!required, "SAPWISE_REQUIRE_GPU=1, and no adapter was found: {}", answer["remark"]);
@@ -71,6 +71,21 @@ pub(crate) fn success(command: &mut Command) -> String {
     let told = String::from_utf8(ended.stdout).unwrap();
     assert_eq!(ended.status.code(), Some(0), "{command:?}: {complaint}{told}");
     told
+}
+
+/// Runs to exit status 0 and returns the JSON on standard output.
+pub(crate) fn answer(command: &mut Command) -> Value {
+    serde_json::from_str(&success(command)).unwrap()
+}
+
+/// The file of a tuning that runs each algorithm from a number of objects on.
+pub(crate) fn tuning(steps: &[(u32, &str)]) -> Value {
+    let step = |(from, id): &(u32, &str)| json!({"from_objects": from, "algorithm": id});
+    json!({
+        "schema": "tuning/3", "source": "default", "model": null, "extrapolated": false, "warnings": [],
+        "scenario": "uniform", "steps": steps.iter().map(step).collect::<Value>(), "crossovers": [],
+        "interval_basis": "", "costs": []
+    })
 }
 
 /// Runs to this exit status and returns standard error, which must not be a panic.
