@@ -25,7 +25,7 @@ pub(crate) fn measure_hardware(threads: Option<u32>, choice: &GpuChoice) -> anyh
 }
 
 fn measure_cpu(threads: Option<u32>) -> Hardware {
-    let progress = Progress::new(Family::ALL.into_iter().map(usual_ms).sum());
+    let progress = Progress::new(Family::ALL.len() as u64);
     let options = Options::default().with_threads(threads);
     let mut found: Vec<Parameter> = Vec::new();
     for family in Family::ALL {
@@ -36,22 +36,9 @@ fn measure_cpu(threads: Option<u32>) -> Hardware {
         } else {
             found.extend(measure::family(family, &options));
         }
-        progress.advance(usual_ms(family));
+        progress.advance(1);
     }
     measure::assemble(measure::machine(), found)
-}
-
-/// The time of a family on a machine of two cores, in milliseconds.
-fn usual_ms(family: Family) -> u64 {
-    match family {
-        Family::Topology => 10,
-        Family::Clock => 400,
-        Family::Caches => 3200,
-        Family::Memory => 1000,
-        Family::CoreToCore => 200,
-        Family::ForkJoin | Family::Scaling => 600,
-        _ => 500,
-    }
 }
 
 /// Refuses more threads than this process may use.

@@ -15,20 +15,8 @@ const DELAY: Duration = Duration::from_secs(1);
 /// Interval of redrawing while no step is done, so that the seconds go on.
 const TICK: Duration = Duration::from_secs(1);
 
-/// Templates with the least width of the terminal in columns: a line that wraps could not be redrawn. The time left
-/// follows from the speed of the latest steps.
-const TEMPLATES: [(u16, &str); 3] = [
-    (80, "{bar:32} {percent:>3} % {elapsed}{left}  {wide_msg}"),
-    (40, "{percent:>3} % {elapsed}{left}  {wide_msg}"),
-    (0, "{percent:>3} % {wide_msg}"),
-];
-
-/// Characters that every terminal and every encoding has.
-const BAR: &str = "=> ";
-
-fn template(columns: u16) -> &'static str {
-    TEMPLATES.iter().find(|(least, _)| columns >= *least).map_or("", |(_, template)| template)
-}
+/// Characters that every terminal and every encoding has. The time left follows from the speed of the latest steps.
+const TEMPLATE: &str = "{percent:>3} % {elapsed}{left}  {wide_msg}";
 
 /// A bar that shows itself after a second, and not at all when standard error is no terminal.
 ///
@@ -43,9 +31,8 @@ impl Progress {
     /// A bar of that many steps.
     pub(crate) fn new(steps: u64) -> Self {
         let bar = ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::hidden());
-        let (_, columns) = console::Term::stderr().size();
-        if let Ok(style) = ProgressStyle::with_template(template(columns)) {
-            bar.set_style(style.progress_chars(BAR).with_key("left", left));
+        if let Ok(style) = ProgressStyle::with_template(TEMPLATE) {
+            bar.set_style(style.with_key("left", left));
         }
         let showing = std::io::stderr().is_terminal().then(|| show_later(bar.clone())).flatten();
         Self { bar, showing }
@@ -147,19 +134,14 @@ mod tests {
 
     #[test]
     fn the_bar_is_plain_and_fits_on_one_line() {
-        for columns in [200, 80, 79, 40, 39, 20] {
-            let terminal = InMemoryTerm::new(10, columns);
-            let bar = ProgressBar::with_draw_target(Some(3), ProgressDrawTarget::term_like(Box::new(terminal.clone())));
-            let style = ProgressStyle::with_template(template(columns)).unwrap();
-            bar.set_style(style.progress_chars(BAR).with_key("left", left));
-            bar.set_message(
-                "clustered: 20000 objects, a message that is longer than any of these terminals is wide, and goes on",
-            );
-            bar.inc(1);
-            bar.force_draw();
-            let shown = terminal.contents();
-            let fits = shown.lines().count() == 1 && shown.len() <= usize::from(columns);
-            assert!(fits && shown.is_ascii() && shown.contains("33 %"), "{columns}: {shown:?}");
-        }
+        let terminal = InMemoryTerm::new(10, 60);
+        let bar = ProgressBar::with_draw_target(Some(3), ProgressDrawTarget::term_like(Box::new(terminal.clone())));
+        bar.set_style(ProgressStyle::with_template(TEMPLATE).unwrap().with_key("left", left));
+        bar.set_message("clustered: 20000 objects, a message that is longer than this terminal is wide");
+        bar.inc(1);
+        bar.force_draw();
+        let shown = terminal.contents();
+        assert!(shown.lines().count() == 1 && shown.len() <= 60, "{shown:?}");
+        assert!(shown.is_ascii() && shown.contains("33 %"), "{shown:?}");
     }
 }
