@@ -5,7 +5,6 @@ use std::ffi::OsStr;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 /// Writes what `write` produces to `path`, so that a reader never sees half of it.
 ///
@@ -36,38 +35,10 @@ pub fn write_text(path: &Path, text: &str) -> Result<()> {
 /// What the names of files begin and end with that are there until they are moved to their place.
 const TEMPORARY: [&str; 2] = [".sapwise-", ".tmp"];
 
-/// A younger one may belong to a program that has not locked it yet.
-const ABANDONED_AFTER: Duration = Duration::from_secs(60);
-
 /// Whether a file is called as those are that [`write_atomically`] makes until they are whole.
 #[must_use]
 pub(crate) fn is_temporary(name: &OsStr) -> bool {
     name.to_str().is_some_and(|name| name.starts_with(TEMPORARY[0]) && name.ends_with(TEMPORARY[1]))
-}
-
-/// A lock that lasts until the file is closed, as the system does for a program that is killed. `None` when another
-/// program has it.
-fn locked(path: &Path) -> Option<File> {
-    File::open(path).ok().filter(|file| file.try_lock().is_ok())
-}
-
-/// Removes what programs that were killed have left in a folder. What can't be removed stays: it is in nobody's way.
-fn remove_abandoned(folder: &Path) {
-    for entry in fs::read_dir(folder).into_iter().flatten().flatten().filter(|entry| is_temporary(&entry.file_name())) {
-        let path = entry.path();
-        // Neither a link nor a pipe, which would be waited for, is one of ours.
-        let Some(found) = entry.metadata().ok().filter(fs::Metadata::is_file) else { continue };
-        let old = found.modified().is_ok_and(|at| at.elapsed().is_ok_and(|age| age >= ABANDONED_AFTER));
-        if old && locked(&path).is_some() {
-            let _ = fs::remove_file(&path);
-        }
-    }
-}
-
-fn temporary() -> tempfile::Builder<'static, 'static> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(TEMPORARY[0]).suffix(TEMPORARY[1]);
-    builder
 }
 
 /// Of the error its kind alone: its text names the temporary file, of which the user knows nothing.
@@ -84,14 +55,12 @@ fn replace(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()>) -> Res
     if !folder.is_dir() {
         bail!("there is no folder {}; make it or name another", folder.display());
     }
-    remove_abandoned(&folder);
-    let mut builder = temporary();
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(TEMPORARY[0]).suffix(TEMPORARY[1]);
     // Private otherwise, where every other program's files follow the umask.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let mut temporary = builder.tempfile_in(&folder).map_err(|e| refused(&folder, &e))?;
-    // Where it can't be locked no other program can tell it for abandoned.
-    let _ = temporary.as_file().try_lock();
     buffered(temporary.as_file_mut(), write)?;
     // Without this a crash of the machine may leave the name with an empty file.
     temporary.as_file().sync_all()?;
@@ -135,24 +104,6 @@ mod tests {
         write_atomically(&path, hello).unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"hello");
         assert_eq!(names(folder.path()), ["out"]);
-    }
-
-    #[test]
-    fn what_a_killed_program_has_left_is_removed_and_what_a_running_one_writes_is_not() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = |name: &str| folder.path().join(name);
-        let aged = |name: &str| {
-            let file = File::create(path(name)).unwrap();
-            file.set_modified(std::time::SystemTime::now() - 2 * ABANDONED_AFTER).unwrap();
-            file
-        };
-        drop(aged(".sapwise-killed.tmp"));
-        drop(aged("mine.tmp"));
-        let written = aged(".sapwise-written.tmp");
-        written.lock().unwrap();
-        File::create(path(".sapwise-young.tmp")).unwrap();
-        write_atomically(&path("out"), hello).unwrap();
-        assert_eq!(names(folder.path()), [".sapwise-written.tmp", ".sapwise-young.tmp", "mine.tmp", "out"]);
     }
 
     #[test]
