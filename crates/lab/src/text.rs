@@ -3,7 +3,8 @@
 /// Rows with every column but the last padded to its widest cell, two blanks between columns.
 pub fn columns(rows: &[Vec<String>]) -> String {
     let count = rows.iter().map(Vec::len).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..count).map(|column| width(rows, column)).collect();
+    let width = |row: &Vec<String>, column: usize| row.get(column).map_or(0, |cell| cell.chars().count());
+    let widths: Vec<usize> = (0..count).map(|k| rows.iter().map(|row| width(row, k)).max().unwrap_or(0)).collect();
     let mut text = String::new();
     for row in rows {
         let mut line = String::new();
@@ -16,19 +17,9 @@ pub fn columns(rows: &[Vec<String>]) -> String {
     text
 }
 
-/// Characters of the widest cell of a column.
-pub fn width(rows: &[Vec<String>], column: usize) -> usize {
-    rows.iter().filter_map(|r| r.get(column)).map(|c| c.chars().count()).max().unwrap_or(0)
-}
-
 /// A number of things, with the plural of their name but for one.
 pub fn count(number: usize, thing: &str) -> String {
     format!("{number} {thing}{}", if number == 1 { "" } else { "s" })
-}
-
-/// As [`count`], of a number that may be large.
-pub fn grouped_count(number: usize, thing: &str) -> String {
-    format!("{} {thing}{}", grouped(number as u64), if number == 1 { "" } else { "s" })
 }
 
 /// Nanoseconds with the unit that keeps one to three digits before the point.
@@ -67,7 +58,6 @@ mod tests {
     #[test]
     fn one_thing_has_no_plural() {
         assert_eq!([0, 1, 2].map(|k| count(k, "repeat")), ["0 repeats", "1 repeat", "2 repeats"]);
-        assert_eq!([1, 20_000].map(|k| grouped_count(k, "object")), ["1 object", "20 000 objects"]);
     }
 
     #[test]

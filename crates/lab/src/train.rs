@@ -77,13 +77,9 @@ mod tests {
         Machine::family().iter().map(|m| (format!("{}.json", m.name), m.report())).collect()
     }
 
-    fn of(reports: &[(String, Report)]) -> Selection {
-        Selection::of(reports)
-    }
-
     #[test]
     fn a_model_is_the_same_after_json_and_knows_its_ranges() {
-        let trained = train(of(&reports()), "test", &Silent).unwrap();
+        let trained = train(Selection::of(&reports()), "test", &Silent).unwrap();
         let text = write_model(&trained.model, &trained.training).unwrap();
         let read = read_model(&text).unwrap();
         assert_eq!((read.model, read.training), (trained.model.clone(), trained.training));
@@ -97,7 +93,7 @@ mod tests {
         let machines = Machine::family_with_gpus();
         let reports: Vec<(String, Report)> =
             machines[..3].iter().map(|m| (format!("{}.json", m.name), m.report())).collect();
-        let model = train(of(&reports), "test", &Silent).unwrap().model;
+        let model = train(Selection::of(&reports), "test", &Silent).unwrap().model;
         let range = model.ranges.iter().find(|r| r.parameter == "gpu/upload_rate_gb_per_s").unwrap();
         assert_eq!((range.min, range.max), (5.0, 24.0));
         let all = |ids: &[&str]| ids.iter().map(|id| Entry::new(id.parse().unwrap(), 1)).collect::<Vec<_>>();
@@ -112,7 +108,7 @@ mod tests {
 
     #[test]
     fn one_report_makes_a_model_without_scores() {
-        let trained = train(of(&reports()[..1]), "test", &Silent).unwrap();
+        let trained = train(Selection::of(&reports()[..1]), "test", &Silent).unwrap();
         assert_eq!(trained.model.methods.len(), truth().len());
         assert!(trained.training.validation.methods.is_empty());
     }
@@ -140,7 +136,7 @@ mod tests {
                 (format!("{}.json", machine.name), report)
             })
             .collect();
-        let trained = train(of(&reports), "test", &Silent).unwrap();
+        let trained = train(Selection::of(&reports), "test", &Silent).unwrap();
         let tree = trained.model.methods.iter().find(|m| m.method == "my-tree").unwrap();
         assert_eq!(tree.terms.iter().map(|t| (t.term, t.scale)).collect::<Vec<_>>(), [(named.term, named.scale)]);
         assert!((tree.terms[0].unit / 9.0 - 1.0).abs() < 0.01, "{tree:?}");
@@ -154,7 +150,7 @@ mod tests {
         let mut report = reports().remove(0);
         report.1.provenance.optimised = false;
         for reports in [vec![], vec![report]] {
-            let error = train(of(&reports), "test", &Silent).unwrap_err().to_string();
+            let error = train(Selection::of(&reports), "test", &Silent).unwrap_err().to_string();
             assert!(error.contains("sapwise probe --out"), "{error}");
         }
     }

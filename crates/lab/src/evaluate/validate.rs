@@ -57,8 +57,7 @@ pub fn validate(
         if !partition.by_machine {
             notes.push(
                 "validated by holding out profiles of one physical machine: this says little about machines never \
-                 seen; add \
-                 reports of other machines"
+                 seen; add reports of other machines"
                     .to_owned(),
             );
         }

@@ -205,17 +205,6 @@ impl Report {
         remark.starts_with("unfinished") || remark.starts_with("interrupted")
     }
 
-    /// Returns the median share of the CPU, 0 to 1, that other programs took, over the points or, without points,
-    /// over the parameters. `None` when the system does not report it.
-    #[must_use]
-    pub fn foreign_load(&self) -> Option<f64> {
-        let mut loads: Vec<f64> = self.points.iter().filter_map(|p| p.foreign_load).collect();
-        if loads.is_empty() {
-            loads = self.hardware.parameters.iter().filter_map(|p| p.foreign_load).collect();
-        }
-        median(&loads)
-    }
-
     /// Returns what makes this report unusable, if anything.
     #[must_use]
     pub fn defect(&self) -> Option<String> {

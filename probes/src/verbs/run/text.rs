@@ -6,7 +6,7 @@ use crate::replay::{Outcome, Part, ReplaySettings, Times, WINDOW};
 use crate::shell;
 use crate::terminal::Terminal;
 use sapwise::AlgorithmId;
-use sapwise_lab::text::{count, duration, grouped, grouped_count};
+use sapwise_lab::text::{count, duration, grouped};
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
@@ -86,8 +86,8 @@ impl Answer<'_> {
     pub(super) fn text(&self, arguments: &Run, terminal: Terminal) -> String {
         let outcome = self.outcome;
         let (min, max) = self.objects();
-        let most = grouped_count(max, "object");
-        let objects = if min == max { most } else { format!("{} to {most}", grouped(min as u64)) };
+        let least = if min == max { String::new() } else { format!("{} to ", grouped(min as u64)) };
+        let objects = format!("{least}{} object{}", grouped(max as u64), if max == 1 { "" } else { "s" });
         let (frames, repeats) = (count(outcome.frames.len(), "frame"), count(outcome.repeats, "repeat"));
         let name = self.settings.source.name();
         let head = format!("{name}, {frames} of {objects}, medians of {repeats}, same pairs from all");
