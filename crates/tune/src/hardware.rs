@@ -175,8 +175,7 @@ fn loaded(of: &str, parameters: &[Parameter]) -> Option<String> {
     let (name, load) = spoiled.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
     Some(format!(
         "other programs or the host took more than {:.0} % of the CPU while {} of the parameters{of} were measured, \
-         {:.0} % with \
-         {name}; unless that is intended, probe again when the machine is idle",
+         {:.0} % with {name}; unless that is intended, probe again when the machine is idle",
         REPORTED_LOAD * 100.0,
         spoiled.len(),
         load * 100.0

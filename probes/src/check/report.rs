@@ -190,9 +190,8 @@ fn moved_cores(report: &Report) -> Option<String> {
     let elsewhere = latencies.iter().filter(|both| !both.iter().all(is_usual)).count() as f64 / latencies.len() as f64;
     (elsewhere > MOVED_SHARE).then(|| {
         format!(
-            "the cores of the machine moved: the latency between them was not near its usual {usual:.0} ns at {:.0} \
-             % of \
-             the points; timings of several threads differ with it",
+            "the cores of the machine moved: the latency between them was not near its usual {usual:.0} ns at {:.0} % \
+             of the points; timings of several threads differ with it",
             elsewhere * 100.0
         )
     })

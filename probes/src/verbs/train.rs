@@ -62,9 +62,8 @@ fn name(arguments: &Train) -> anyhow::Result<String> {
 
 /// What the columns of the summary mean.
 const COLUMNS: &str = "Regret is time over the best time, less one; in parentheses weighted by how often games are \
-    assumed to have that many \
-objects (log-normal\naround 800). Crossovers off by: median distance between measured and predicted crossovers. \
---card explains every column.\n";
+                       assumed to have that many objects (log-normal\naround 800). Crossovers off by: median distance \
+                       between measured and predicted crossovers. --card explains every column.\n";
 
 fn summary(model: &Model, training: &Training, notes: &[String], path: &Path, terminal: Terminal) -> String {
     let table = |rows: &[Vec<String>]| terminal.table(rows);

@@ -68,9 +68,8 @@ fn measure_crossovers(tuning: &mut Tuning, report: &Report) {
     }
     if measured > 0 {
         tuning.interval_basis = format!(
-            "{measured} of {}: 90 % by paired samples, from the size at which the one below is clearly cheaper to \
-             the size at which the \
-             one above is, or to the last size at which both were timed; the others: {}",
+            "{measured} of {}: 90 % by paired samples, from the size at which the one below is clearly cheaper to the \
+             size at which the one above is, or to the last size at which both were timed; the others: {}",
             tuning.crossovers.len(),
             tuning.interval_basis
         );

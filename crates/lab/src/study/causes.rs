@@ -71,10 +71,9 @@ pub(super) fn section(material: &Material, page: &mut Page, files: &mut Vec<(&st
     };
     let svg = matrix.svg()?;
     let caption = "Crossovers regressed on the logarithms of parameters by least squares. In parentheses the mean \
-        error of the fit; in the cells \
-                   how much it rises when the values of one parameter are exchanged between reports, the mean over \
-                   30 permutations. An empty \
-                   cell: the regression does not read that parameter.";
+                   error of the fit; in the cells how much it rises when the values of one parameter are exchanged \
+                   between reports, the mean over 30 permutations. An empty cell: the regression does not read that \
+                   parameter.";
     page.figure("figure-11-influence.svg", &svg, caption);
     files.push(("figure-11-influence.svg", svg));
     Ok(())

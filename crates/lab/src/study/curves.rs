@@ -52,9 +52,8 @@ pub(super) fn section(material: &Material, page: &mut Page, files: &mut Vec<(&st
     page.section("Time over objects");
     page.text(
         "Each curve is the fastest algorithm on that many threads or GPUs, medians over the frames of one scenario. \
-         Shades are the fields of \
-         optimal performance between the crossovers of curves that were fitted to the same timings. GPU times \
-         include the transfers.",
+         Shades are the fields of optimal performance between the crossovers of curves that were fitted to the same \
+         timings. GPU times include the transfers.",
     );
     let figures = [
         (Compared::CpuAndGpu, "figure-4-cpu-gpu.svg", "Figure 4: CPU and GPU", "no report has timings of both"),
@@ -93,8 +92,7 @@ pub(super) fn section(material: &Material, page: &mut Page, files: &mut Vec<(&st
     }
     page.text(
         "Figure 8, the choice frame by frame beside every fixed algorithm, is drawn by `sapwise run SCENARIO --plot \
-         P.svg` on the machine \
-         itself.",
+         P.svg` on the machine itself.",
     );
     Ok(())
 }

@@ -39,8 +39,7 @@ pub(super) fn section(material: &Material, page: &mut Page) {
     }
     if rows.len() > 1 {
         let caption = "Figure 9: GPUs. Those of the paper are as it prints them; the others are measured or reported \
-            by the driver. Software \
-                       means an adapter that runs on the CPU.";
+                       by the driver. Software means an adapter that runs on the CPU.";
         page.table(caption, &rows);
     } else {
         page.lacks("Figure 9: no report has a GPU; datasets/published holds the three cards of the paper.");

@@ -144,8 +144,7 @@ impl Material {
     fn lead(&self) -> String {
         format!(
             "From {}: the timings of {} on {}. Sapwise {}. All tables are beside this page as CSV: timings.csv, \
-             crossovers.csv, regrets.csv \
-             and parameters.csv.",
+             crossovers.csv, regrets.csv and parameters.csv.",
             count(self.reports.len(), "report"),
             count(self.profiles.len(), "report"),
             count(data::machines(&self.profiles).len(), "host"),
@@ -192,9 +191,8 @@ fn regrets(material: &Material, page: &mut Page) {
         String::new()
     });
     page.text(
-        "Regret is the time of what is chosen over that of the best choice, less one. In parentheses it is weighted \
-         by the numbers of \
-         objects that games are assumed to have, log-normal around 800.",
+        "Regret is the time of what is chosen over that of the best choice, less one. In parentheses it is weighted by \
+         the numbers of objects that games are assumed to have, log-normal around 800.",
     );
     page.table(what.trim(), &rows.into_inner());
 }

@@ -9,8 +9,7 @@ impl Bounds {
         let value = value.filter(|v| !(least..=most).contains(v))?;
         Some(HardwareError(format!(
             "the parameter {name}{of} is {value}, and no machine lies outside {least} to {most}; check its unit, or \
-             measure it with \
-             `sapwise probe --hardware-only`"
+             measure it with `sapwise probe --hardware-only`"
         )))
     }
 }

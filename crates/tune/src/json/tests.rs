@@ -41,7 +41,7 @@ fn another_schema_is_refused_by_name() {
         assert!(error.to_string().contains("\"tuning/3\", which `sapwise predict"), "{other}: {error}");
     }
     let old = model(r#"{"schema": "model/1"}"#).unwrap_err().to_string();
-    assert!(old.contains("\"model/1\"") && old.contains("`sapwise train"), "{old}");
+    assert!(old.contains("\"model/1\"") && old.contains("`sapwise train REPORTS... --out MODEL.json`"), "{old}");
 }
 
 #[test]

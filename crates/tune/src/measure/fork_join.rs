@@ -33,8 +33,7 @@ pub(super) fn measure(options: &Options) -> Result<Vec<Parameter>, String> {
     let workers = workers(threads)?;
     let warm = format!(
         "phase of {threads} bodies of 20 µs, one on the calling thread and the others on {} awake helpers, minus one \
-         body; a sample is the \
-         median of {PHASES}",
+         body; a sample is the median of {PHASES}",
         threads - 1
     );
     let cold = "the same with bodies of 300 µs, after the helpers were idle for 2 ms while the calling thread worked";

@@ -34,8 +34,7 @@ const NO_INTERVALS: &str =
 
 /// What to do if a machine is unlike those of the training.
 const ASK: &str = "this machine is unlike those of the training: measure it with `sapwise probe --out report.json`, \
-    then \
-                   `sapwise predict --report report.json --measured`";
+                   then `sapwise predict --report report.json --measured`";
 
 /// Costs that are known already, by method and backend.
 type Works<'a> = Vec<(&'a str, Backend, Arc<Work>)>;
