@@ -28,14 +28,7 @@ impl Gpus {
     /// The environment variables of drivers and wgpu apply (`VK_DRIVER_FILES`, `WGPU_BACKEND`, ...).
     #[must_use]
     pub fn find() -> Self {
-        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle().with_env();
-        descriptor.backends &= wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12;
-        // Installed validation layers would check every call, in release builds too.
-        descriptor.flags -= wgpu::InstanceFlags::VALIDATION | wgpu::InstanceFlags::DEBUG;
-        let backends = descriptor.backends;
-        let instance = wgpu::Instance::new(descriptor);
-        let mut adapters = pollster::block_on(instance.enumerate_adapters(backends));
-        adapters.retain(|a| a.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS));
+        let adapters = pollster::block_on(adapters());
         let infos: Vec<wgpu::AdapterInfo> = adapters.iter().map(wgpu::Adapter::get_info).collect();
         let keep = |k: usize| {
             !infos[..k].iter().any(|b| same_card(&infos[k], b)) && !infos.iter().any(|b| twins(&infos[k], b))
@@ -183,13 +176,26 @@ impl Gpus {
     }
 }
 
+/// Returns the adapters that run compute shaders.
+pub(super) async fn adapters() -> Vec<wgpu::Adapter> {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle().with_env();
+    descriptor.backends &= wgpu::Backends::PRIMARY;
+    // Installed validation layers would check every call, in release builds too.
+    descriptor.flags -= wgpu::InstanceFlags::VALIDATION | wgpu::InstanceFlags::DEBUG;
+    let backends = descriptor.backends;
+    let instance = wgpu::Instance::new(descriptor);
+    let mut adapters = instance.enumerate_adapters(backends).await;
+    adapters.retain(|a| a.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS));
+    adapters
+}
+
 impl Found {
     fn open(&self) -> Result<Gpu, GpuError> {
         let Some(adapter) = &self.adapter else {
             let text = format!("gpu{} is the program's own device, which can't be opened again", self.identity.index);
             return Err(GpuError::new(GpuErrorKind::NotFound, text));
         };
-        let gpu = Gpu::open(adapter, self.identity.clone())?;
+        let gpu = pollster::block_on(Gpu::open(adapter, self.identity.clone()))?;
         if let Some(limit) = *self.wait_limit.lock().unwrap_or_else(PoisonError::into_inner) {
             gpu.set_wait_limit(limit);
         }

@@ -1,5 +1,6 @@
 //! An open GPU: device, queue, limits, and what went wrong with it.
 
+use super::late::Late;
 use super::scope::{Recording, Scope};
 use super::watch::{Place, Watch};
 use sapwise::error::{GpuError, GpuErrorKind};
@@ -29,6 +30,7 @@ struct Shared {
     fault: Fault,
     wait_limit_ms: AtomicU64,
     watch: OnceLock<Watch>,
+    late: Late,
 }
 
 /// Set once: the first fault stays.
@@ -40,7 +42,7 @@ fn note(fault: &Fault, error: GpuError) {
 
 impl Gpu {
     /// Opens an adapter with all its limits.
-    pub(super) fn open(adapter: &wgpu::Adapter, identity: GpuIdentity) -> Result<Self, GpuError> {
+    pub(super) async fn open(adapter: &wgpu::Adapter, identity: GpuIdentity) -> Result<Self, GpuError> {
         let limits = adapter.limits();
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("sapwise"),
@@ -50,7 +52,7 @@ impl Gpu {
             memory_hints: wgpu::MemoryHints::Performance,
             ..Default::default()
         };
-        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).map_err(|e| {
+        let (device, queue) = adapter.request_device(&descriptor).await.map_err(|e| {
             GpuError::caused(GpuErrorKind::NotFound, format!("gpu{} can't be opened", identity.index), e)
         })?;
         let gpu = Self::from_parts(device, queue, identity);
@@ -66,8 +68,8 @@ impl Gpu {
     pub fn from_parts(device: wgpu::Device, queue: wgpu::Queue, identity: GpuIdentity) -> Self {
         let limits = device.limits();
         let wait_limit_ms = AtomicU64::new(WAIT_LIMIT.as_millis() as u64);
-        let (fault, watch) = (Fault::default(), OnceLock::new());
-        Self { shared: Arc::new(Shared { identity, device, queue, limits, fault, wait_limit_ms, watch }) }
+        let (fault, watch, late) = (Fault::default(), OnceLock::new(), Late::default());
+        Self { shared: Arc::new(Shared { identity, device, queue, limits, fault, wait_limit_ms, watch, late }) }
     }
 
     /// Sets the handlers of a device that we opened ourselves, so that a loss is known before the next frame.
@@ -116,7 +118,8 @@ impl Gpu {
     pub fn submit(&self, mut recording: Recording) -> Result<wgpu::SubmissionIndex, GpuError> {
         self.check()?;
         self.ends("copies after", Place::Commands(&mut recording));
-        let submission = recording.submit(&self.shared.queue).map_err(|e| self.refusal("the device refuses", e));
+        let submission = recording.submit(&self.shared.queue, &self.shared.late);
+        let submission = submission.map_err(|e| self.refusal("the device refuses", e));
         self.ends("submitting", Place::Host);
         submission
     }
@@ -129,17 +132,15 @@ impl Gpu {
         mode: wgpu::MapMode,
         done: impl FnOnce(Result<(), wgpu::BufferAsyncError>) + Send + 'static,
     ) {
-        let scope = Scope::of_one(&self.shared.device, wgpu::ErrorFilter::Validation);
+        let _scope = Scope::of_one(&self.shared.device, wgpu::ErrorFilter::Validation);
         slice.map_async(mode, done);
-        let _ = scope.end();
     }
 
     /// Unmaps a buffer. If the device was lost this fails, and the next submission reports it.
     #[doc(hidden)]
     pub fn unmap(&self, buffer: &wgpu::Buffer) {
-        let scope = Scope::of_one(&self.shared.device, wgpu::ErrorFilter::Validation);
+        let _scope = Scope::of_one(&self.shared.device, wgpu::ErrorFilter::Validation);
         buffer.unmap();
-        let _ = scope.end();
     }
 
     /// Returns the error of a device that refuses; if it was lost, that instead, because its other errors follow from
@@ -153,7 +154,7 @@ impl Gpu {
     pub(super) fn probe(&self) -> Result<(), GpuError> {
         let scope = Scope::new(&self.shared.device);
         let submission = self.shared.queue.submit([]);
-        let _ = scope.end();
+        drop(scope);
         let polled =
             self.poll(wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(Duration::ZERO) });
         match polled {
@@ -223,7 +224,7 @@ impl Gpu {
     }
 
     /// Waits for a submission, at most as long as the [limit](Self::set_wait_limit), and runs the callbacks of
-    /// finished mappings.
+    /// finished mappings. In a browser, where nothing may wait, it does neither.
     ///
     /// # Errors
     /// [`GpuErrorKind::Lost`] if the device was lost or takes too long. It counts as lost from then on.
@@ -239,7 +240,20 @@ impl Gpu {
         self.wait_for(None)
     }
 
-    fn wait_for(&self, submission_index: Option<wgpu::SubmissionIndex>) -> Result<(), GpuError> {
+    /// Waits for the browser's errors about all calls.
+    #[cfg(target_family = "wasm")]
+    pub(super) async fn settle(&self) -> Result<(), GpuError> {
+        if let Some(error) = self.shared.late.settle().await {
+            // Nobody knows any more which call it was, so the device can't be relied on.
+            note(&self.shared.fault, GpuError::caused(GpuErrorKind::Refused, "the device refuses", error));
+        }
+        self.check()
+    }
+
+    pub(super) fn wait_for(&self, submission_index: Option<wgpu::SubmissionIndex>) -> Result<(), GpuError> {
+        if cfg!(target_family = "wasm") {
+            return self.check();
+        }
         let limit = self.wait_limit();
         let began = Instant::now();
         match self.poll(wgpu::PollType::Wait { submission_index, timeout: Some(limit) }) {
@@ -287,7 +301,7 @@ impl Gpu {
     pub fn try_make<T>(&self, make: impl FnOnce(&wgpu::Device) -> T) -> Result<T, GpuError> {
         let scope = Scope::new(&self.shared.device);
         let made = make(&self.shared.device);
-        scope.end().map_err(|e| self.refusal("the device refuses", e)).map(|()| made)
+        scope.end(&self.shared.late).map_err(|e| self.refusal("the device refuses", e)).map(|()| made)
     }
 }
 

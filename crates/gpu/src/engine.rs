@@ -13,6 +13,7 @@ mod tests;
 
 use super::brute::Brute;
 use super::device::Gpu;
+use super::failure::Failure;
 use super::look::Look;
 use super::output::{Output, PAIR};
 use super::params::{Header, Params};
@@ -24,9 +25,10 @@ use super::storage::{Storage, largest};
 use super::transfer::{Transfer, copy};
 use super::watch::Place;
 use bytemuck::{bytes_of, cast_slice};
-use sapwise::Aabb;
+use sapwise::algorithm::FramePlan;
 use sapwise::error::{GpuError, GpuErrorKind};
 use sapwise::internals::{SampledBoxes, Workers};
+use sapwise::{Aabb, Pairs};
 use std::sync::OnceLock;
 
 /// Bytes of a box.
@@ -241,11 +243,24 @@ impl Engine {
         (self.gpu.limits().max_buffer_size - PAIRS_AT).min(MOST_DOWNLOAD) / PAIR
     }
 
+    /// Finds the pairs of a whole frame.
+    pub(super) async fn find(
+        &mut self,
+        plan: &FramePlan,
+        boxes: &[Aabb],
+        pairs: &mut Pairs,
+        workers: &Workers,
+    ) -> Result<(), Failure> {
+        let look = || Look::of(&SampledBoxes::from(boxes), plan.stats(boxes));
+        self.start(boxes, None, |engine| engine.plan(boxes.len() as u32, look), workers).await?;
+        self.finish(pairs, workers).await
+    }
+
     /// Submits a frame, or a piece of one, and does not wait: several GPUs work at once.
     ///
     /// `ids` has the number of each box in the frame, with the highest bit set if this piece owns the pairs of the
     /// box. `None`: `boxes` is the whole frame. `plan` runs beside the copies.
-    pub(super) fn start(
+    pub(super) async fn start(
         &mut self,
         boxes: &[Aabb],
         ids: Option<&[u32]>,
@@ -256,7 +271,7 @@ impl Engine {
         let ids_at = BOXES_AT as usize + boxes.len();
         let end = ids_at + numbers.len();
         self.upload.ensure(&self.gpu, end as u64)?;
-        let mut view = self.upload.writable(&self.gpu, end as u64)?;
+        let mut view = self.upload.writable(&self.gpu, end as u64).await?;
         let planned = OnceLock::new();
         let plan = || *planned.get_or_init(|| plan(self));
         copy(boxes, view.slice(BOXES_AT as usize..ids_at), workers, || _ = plan());
@@ -269,9 +284,9 @@ impl Engine {
     }
 
     /// Submits a frame of boxes that are on the GPU, and does not wait.
-    pub(super) fn start_resident(&mut self, boxes: &wgpu::Buffer, params: Params) -> Result<(), GpuError> {
+    pub(super) async fn start_resident(&mut self, boxes: &wgpu::Buffer, params: Params) -> Result<(), GpuError> {
         self.prepare(&params, false, Some(boxes))?;
-        let view = self.upload.writable(&self.gpu, BOXES_AT)?;
+        let view = self.upload.writable(&self.gpu, BOXES_AT).await?;
         self.submit(view, params, [0; 2])
     }
 
@@ -369,14 +384,14 @@ impl Engine {
     }
 
     /// Looks at boxes that are on the GPU, and waits for it.
-    pub(super) fn look(&mut self, boxes: &wgpu::Buffer, objects: u32) -> Result<Look, GpuError> {
+    pub(super) async fn look(&mut self, boxes: &wgpu::Buffer, objects: u32) -> Result<Look, GpuError> {
         let params = Params { objects, ..Params::default() };
         self.prepare(&params, false, Some(boxes))?;
         let mut encoder = self.gpu.record();
         self.set(&params);
         self.sample(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()));
         let submission = self.submit_and_download(encoder, 0)?;
-        self.gpu.wait(submission)?;
+        self.download.wait(&self.gpu, Some(submission)).await?;
         Ok(Look::at(&self.sampled()?))
     }
 

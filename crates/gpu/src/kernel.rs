@@ -165,6 +165,7 @@ pub(super) fn dispatched() -> u32 {
 
 /// Panics unless wgpu takes the text as a shader. Needs no driver. Writes it to `NAME.wgsl` in the folder
 /// `SAPWISE_SHADERS`, if set, for the compilers of `tools/shader-check.sh`.
+#[cfg(not(target_family = "wasm"))]
 pub fn assert_valid(name: &str, text: &str) {
     use wgpu::naga::{front, valid};
     let module = front::wgsl::parse_str(text).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(text)));

@@ -40,11 +40,16 @@
 //! | `grid-sap` | counting sort into the slots of a grid of strips; oversized boxes go into a tree |
 //! | `bvh` | a tree over all boxes, in the order of a Hilbert curve; eight consecutive boxes form a node |
 //!
+//! In a browser nothing may wait. There, `Gpu::in_browser` opens WebGPU and `AsyncBroadPhase` runs a method, by the same
+//! code; everything else of this package that waits is for other systems. Enable the feature `webgpu`.
+//!
 //! A GPU that is lost, refuses memory, executes nothing or does not answer within a minute is
 //! [`Error::Unavailable`](sapwise::Error). [`Adaptive`](sapwise::Adaptive) then runs the same frame on another
 //! algorithm.
 
 mod adapters;
+#[cfg(target_family = "wasm")]
+mod browser;
 mod brute;
 mod cells;
 mod device;
@@ -53,6 +58,7 @@ mod engine;
 mod failure;
 #[doc(hidden)]
 pub mod kernel;
+mod late;
 mod look;
 mod methods;
 mod on_gpus;
@@ -76,6 +82,8 @@ pub mod watch;
 #[cfg(test)]
 pub(crate) use adapters::first_for_tests;
 pub use adapters::{Gpus, identity};
+#[cfg(target_family = "wasm")]
+pub use browser::AsyncBroadPhase;
 pub use device::Gpu;
 pub use methods::algorithms;
 pub use on_gpus::broad_phase;

@@ -140,7 +140,9 @@ impl BroadPhase for OnGpus {
             return Err(Failure::limit(text).of(&self.id));
         }
         let found = match self.parts.as_mut_slice() {
-            [part] if boxes.len() <= part.engine.most_objects() => part.whole(plan, boxes, pairs, &self.workers),
+            [part] if boxes.len() <= part.engine.most_objects() => {
+                pollster::block_on(part.engine.find(plan, boxes, pairs, &self.workers))
+            }
             _ => {
                 let found = self.fitting_slabs(&plan.stats(boxes), boxes, pairs);
                 self.parts.iter_mut().for_each(|part| part.pairs.end_part());

@@ -148,7 +148,7 @@ impl Resident {
     fn plan(&mut self, boxes: &wgpu::Buffer, objects: u32) -> Result<Params, Failure> {
         let look = match self.look {
             Some(look) => look,
-            None => *self.look.insert(self.engine.look(boxes, objects)?),
+            None => *self.look.insert(pollster::block_on(self.engine.look(boxes, objects))?),
         };
         Ok(self.engine.plan(objects, || look))
     }
@@ -159,11 +159,11 @@ impl Resident {
             return Ok(0);
         }
         let params = self.plan(boxes, objects)?;
-        self.engine.start_resident(boxes, params)?;
+        pollster::block_on(self.engine.start_resident(boxes, params))?;
         if let Some(sample) = self.sample.take() {
             self.look = Some(Look::at(&sample));
         }
-        let (count, sample) = self.engine.finish_resident()?;
+        let (count, sample) = pollster::block_on(self.engine.finish_resident())?;
         self.sample = Some(sample);
         Ok(count)
     }

@@ -1,6 +1,7 @@
 //! Error scopes: they catch a device's errors about our calls, so that its handlers, which may be the program's,
 //! never see them.
 
+use super::late::Late;
 use std::ops::{Deref, DerefMut};
 
 /// Catches the errors of this thread's calls, of one kind or of every kind, until it ends.
@@ -19,21 +20,20 @@ impl Scope {
         Self { guards: [Some(device.push_error_scope(filter)), None, None] }
     }
 
-    /// Ends the scope, and returns its error.
-    pub(super) fn end(mut self) -> Result<(), wgpu::Error> {
-        self.pop().map_or(Ok(()), Err)
+    /// Ends the scope, and returns its error. In a browser that comes [`Late`].
+    pub(super) fn end(mut self, late: &Late) -> Result<(), wgpu::Error> {
+        self.guards().fold(None, |error, guard| late.hear(guard.pop()).or(error)).map_or(Ok(()), Err)
     }
 
-    fn pop(&mut self) -> Option<wgpu::Error> {
-        // wgpu insists on the reverse order.
-        let guards = self.guards.iter_mut().rev().filter_map(Option::take);
-        guards.fold(None, |error, guard| pollster::block_on(guard.pop()).or(error))
+    /// Returns the guards that have not ended, in the order that wgpu insists on.
+    fn guards(&mut self) -> impl Iterator<Item = wgpu::ErrorScopeGuard> {
+        self.guards.iter_mut().rev().filter_map(Option::take)
     }
 }
 
 impl Drop for Scope {
     fn drop(&mut self) {
-        let _ = self.pop();
+        self.guards().for_each(drop);
     }
 }
 
@@ -50,9 +50,9 @@ impl Recording {
         Self { encoder, scope }
     }
 
-    pub(super) fn submit(self, queue: &wgpu::Queue) -> Result<wgpu::SubmissionIndex, wgpu::Error> {
+    pub(super) fn submit(self, queue: &wgpu::Queue, late: &Late) -> Result<wgpu::SubmissionIndex, wgpu::Error> {
         let submission = queue.submit([self.encoder.finish()]);
-        self.scope.end().map(|()| submission)
+        self.scope.end(late).map(|()| submission)
     }
 }
 

@@ -5,7 +5,6 @@ use super::engine::Engine;
 use super::failure::Failure;
 use super::look::Look;
 use super::slabs::{Members, Slabs};
-use sapwise::algorithm::FramePlan;
 use sapwise::error::GpuError;
 use sapwise::internals::{SampledBoxes, Workers};
 use sapwise::{Aabb, Pairs};
@@ -50,19 +49,6 @@ impl Share {
         })
     }
 
-    /// Finds the pairs of a whole frame.
-    pub(super) fn whole(
-        &mut self,
-        plan: &FramePlan,
-        boxes: &[Aabb],
-        pairs: &mut Pairs,
-        workers: &Workers,
-    ) -> Result<(), Failure> {
-        let look = || Look::of(&SampledBoxes::from(boxes), plan.stats(boxes));
-        self.engine.start(boxes, None, |engine| engine.plan(boxes.len() as u32, look), workers)?;
-        self.engine.finish(pairs, workers)
-    }
-
     /// Begins a frame of slabs.
     pub(super) fn begin(&mut self) {
         (self.work, self.began) = (0.0, None);
@@ -83,7 +69,8 @@ impl Share {
         self.work += (boxes.len() as f64).powf(self.engine.growth());
         let look = || Look::at(&SampledBoxes::from(boxes.as_slice()));
         let plan = |engine: &Engine| engine.plan(boxes.len() as u32, look);
-        self.failure = self.engine.start(boxes, Some(ids), plan, &Workers::one()).err().map(Failure::Gpu);
+        let started = pollster::block_on(self.engine.start(boxes, Some(ids), plan, &Workers::one()));
+        self.failure = started.err().map(Failure::Gpu);
     }
 
     /// Waits for the slab. The first of `rounds` slabs counts for the speed only if there are no others.
@@ -91,7 +78,7 @@ impl Share {
         if self.full || self.failure.is_some() {
             return;
         }
-        self.failure = self.engine.finish(&mut self.pairs, &Workers::one()).err();
+        self.failure = pollster::block_on(self.engine.finish(&mut self.pairs, &Workers::one())).err();
         if let Some(began) = self.began.filter(|_| self.failure.is_none() && rounds == 1 && self.work > SMALLEST_WORK) {
             let speed = self.work / began.elapsed().as_nanos().max(1) as f64;
             self.speed = Some(self.speed.map_or(speed, |before| before + SPEED_FOLLOWS * (speed - before)));

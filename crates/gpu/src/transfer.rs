@@ -5,8 +5,9 @@ use super::storage::Storage;
 use sapwise::error::GpuError;
 use sapwise::internals::Workers;
 use std::iter;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::task::Waker;
 use std::time::{Duration, Instant};
 
 /// A buffer that the CPU writes or reads while it is mapped, and the GPU copies while it is not.
@@ -14,8 +15,39 @@ use std::time::{Duration, Instant};
 pub(super) struct Transfer {
     storage: Storage,
     mode: wgpu::MapMode,
-    /// One of the constants below. The device sets it when a mapping is done.
-    state: Arc<AtomicU8>,
+    mapping: Arc<Mapping>,
+}
+
+/// How far a mapping is.
+#[derive(Debug, Default)]
+struct Mapping {
+    /// One of the constants below. The device sets it when the mapping is done.
+    state: AtomicU8,
+    /// Who waits in a browser, which may not block.
+    waiting: Mutex<Option<Waker>>,
+}
+
+impl Mapping {
+    fn state(&self) -> u8 {
+        self.state.load(Ordering::Acquire)
+    }
+
+    fn end(&self, mapped: bool) {
+        self.state.store(if mapped { MAPPED } else { UNMAPPED }, Ordering::Release);
+        if let Some(waker) = self.waiting.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            waker.wake();
+        }
+    }
+
+    /// Waits until it is done.
+    #[cfg(target_family = "wasm")]
+    async fn ended(&self) {
+        std::future::poll_fn(|context| {
+            *self.waiting.lock().unwrap_or_else(PoisonError::into_inner) = Some(context.waker().clone());
+            if self.state() == ASKED { std::task::Poll::Pending } else { std::task::Poll::Ready(()) }
+        })
+        .await;
+    }
 }
 
 const UNMAPPED: u8 = 0;
@@ -54,7 +86,7 @@ impl Transfer {
     }
 
     fn new(gpu: &Gpu, label: &'static str, usage: wgpu::BufferUsages, mode: wgpu::MapMode) -> Result<Self, GpuError> {
-        Ok(Self { storage: Storage::with_usage(gpu, label, usage)?, mode, state: Arc::default() })
+        Ok(Self { storage: Storage::with_usage(gpu, label, usage)?, mode, mapping: Arc::default() })
     }
 
     pub(super) fn buffer(&self) -> &wgpu::Buffer {
@@ -68,7 +100,7 @@ impl Transfer {
     pub(super) fn ensure(&mut self, gpu: &Gpu, bytes: u64) -> Result<(), GpuError> {
         if bytes > self.storage.bytes() {
             // The old buffer's callback must not change the new buffer's state.
-            self.state = Arc::default();
+            self.mapping = Arc::default();
             self.storage.ensure(gpu, bytes)?;
         }
         Ok(())
@@ -76,20 +108,18 @@ impl Transfer {
 
     /// Asks the device to map the first `bytes` as soon as the GPU is done with them.
     pub(super) fn ask(&self, gpu: &Gpu, bytes: u64) {
-        if self.state.compare_exchange(UNMAPPED, ASKED, Ordering::AcqRel, Ordering::Acquire).is_ok() {
-            let state = Arc::clone(&self.state);
-            let done = move |result: Result<(), wgpu::BufferAsyncError>| {
-                state.store(if result.is_ok() { MAPPED } else { UNMAPPED }, Ordering::Release);
-            };
+        if self.mapping.state.compare_exchange(UNMAPPED, ASKED, Ordering::AcqRel, Ordering::Acquire).is_ok() {
+            let mapping = Arc::clone(&self.mapping);
+            let done = move |result: Result<(), wgpu::BufferAsyncError>| mapping.end(result.is_ok());
             gpu.map(self.storage.buffer().slice(0..bytes.next_multiple_of(8).min(self.bytes())), self.mode, done);
         }
     }
 
     /// Returns the mapped memory to write to. Waits for the mapping unless it was asked for ahead.
-    pub(super) fn writable(&self, gpu: &Gpu, bytes: u64) -> Result<wgpu::BufferViewMut, GpuError> {
-        if self.state.load(Ordering::Acquire) != MAPPED {
+    pub(super) async fn writable(&self, gpu: &Gpu, bytes: u64) -> Result<wgpu::BufferViewMut, GpuError> {
+        if self.mapping.state() != MAPPED {
             self.ask(gpu, self.bytes());
-            gpu.wait_all()?;
+            self.wait(gpu, None).await?;
         }
         self.mapped(gpu)?;
         self.storage.buffer().get_mapped_range_mut(0..bytes).map_err(|e| gpu.refusal(NOT_MAPPED, e))
@@ -101,6 +131,18 @@ impl Transfer {
         self.storage.buffer().get_mapped_range(bytes).map_err(|e| gpu.refusal(NOT_MAPPED, e))
     }
 
+    /// Waits until the mapping that was asked for is done, which is after `submission`, or after all of them.
+    pub(super) async fn wait(&self, gpu: &Gpu, submission: Option<wgpu::SubmissionIndex>) -> Result<(), GpuError> {
+        #[cfg(target_family = "wasm")]
+        {
+            let _ = submission;
+            self.mapping.ended().await;
+            gpu.settle().await
+        }
+        #[cfg(not(target_family = "wasm"))]
+        gpu.wait_for(submission)
+    }
+
     /// Checks that the mapping is done, after a wait for the GPU. If several threads wait for one GPU, another one
     /// may have taken this mapping's callback and be about to run it.
     fn mapped(&self, gpu: &Gpu) -> Result<(), GpuError> {
@@ -108,33 +150,36 @@ impl Transfer {
         if mapped { Ok(()) } else { Err(gpu.refusal(NOT_MAPPED, wgpu::BufferAsyncError)) }
     }
 
-    /// Polls the device until the memory is mapped or time runs out, and returns whether it is mapped.
+    /// Polls the device until the memory is mapped or time runs out, and returns whether it is mapped. Does not poll
+    /// in a browser, which maps only when nothing runs.
     pub(super) fn arrives_within(&self, gpu: &Gpu, limit: Duration) -> Result<bool, GpuError> {
-        let start = Instant::now();
-        while self.is_on_its_way() && start.elapsed() < limit {
-            self.arrived(gpu)?;
-            std::thread::yield_now();
+        if cfg!(not(target_family = "wasm")) {
+            let start = Instant::now();
+            while self.is_on_its_way() && start.elapsed() < limit {
+                self.arrived(gpu)?;
+                std::thread::yield_now();
+            }
         }
-        Ok(self.state.load(Ordering::Acquire) == MAPPED)
+        Ok(self.mapping.state() == MAPPED)
     }
 
     /// Polls the device once, and returns whether the memory is mapped.
     pub(super) fn arrived(&self, gpu: &Gpu) -> Result<bool, GpuError> {
         gpu.poll(wgpu::PollType::Poll).map_err(|e| gpu.refusal(NOT_MAPPED, e))?;
         gpu.check()?;
-        Ok(self.state.load(Ordering::Acquire) == MAPPED)
+        Ok(self.mapping.state() == MAPPED)
     }
 
     /// Returns whether a mapping was asked for and has neither arrived nor failed.
     pub(super) fn is_on_its_way(&self) -> bool {
-        self.state.load(Ordering::Acquire) == ASKED
+        self.mapping.state() == ASKED
     }
 
     /// Hands the memory back to the GPU.
     pub(super) fn unmap(&mut self) {
-        if self.state.load(Ordering::Acquire) != UNMAPPED {
+        if self.mapping.state() != UNMAPPED {
             // A late callback of this mapping must not pass for one of the next.
-            self.state = Arc::default();
+            self.mapping = Arc::default();
             self.storage.buffer().unmap();
         }
     }

@@ -18,17 +18,17 @@ const POLLED: Duration = Duration::from_millis(1);
 
 impl Engine {
     /// Waits for the frame, and adds its pairs to the list.
-    pub(crate) fn finish(&mut self, pairs: &mut Pairs, workers: &Workers) -> Result<(), Failure> {
+    pub(crate) async fn finish(&mut self, pairs: &mut Pairs, workers: &Workers) -> Result<(), Failure> {
         let mut all = 0;
         while let Pending::Frame(mut frame) = take(&mut self.pending) {
-            let header = self.header_of(&frame)?;
+            let header = self.header_of(&frame).await?;
             let total = header.total();
             all += total;
             if pairs.is_too_small_for(total) {
                 // More than the caller wants: they stay on the GPU.
                 pairs.exceed();
             } else {
-                self.fetch(&mut frame, total, pairs, workers)?;
+                self.fetch(&mut frame, total, pairs, workers).await?;
             }
             if pairs.is_over() {
                 break;
@@ -41,11 +41,11 @@ impl Engine {
 
     /// Waits for the frame. Returns the number of pairs, all of which are in [`pairs_buffer`](Self::pairs_buffer),
     /// and a sample of the boxes.
-    pub(crate) fn finish_resident(&mut self) -> Result<(u32, SampledBoxes), Failure> {
+    pub(crate) async fn finish_resident(&mut self) -> Result<(u32, SampledBoxes), Failure> {
         let mut all = 0_u64;
         let mut sample = None;
         while let Pending::Frame(mut frame) = take(&mut self.pending) {
-            let header = self.header_of(&frame)?;
+            let header = self.header_of(&frame).await?;
             // Every submission of a frame has the same sample.
             sample = Some(sample.map_or_else(|| self.sampled(), Ok)?);
             let before = all;
@@ -94,9 +94,9 @@ impl Engine {
     }
 
     /// Waits for a frame and returns its header.
-    fn header_of(&self, frame: &Frame) -> Result<Header, Failure> {
+    async fn header_of(&self, frame: &Frame) -> Result<Header, Failure> {
         if !self.download.arrives_within(&self.gpu, POLLED)? {
-            self.gpu.wait(frame.submission.clone())?;
+            self.download.wait(&self.gpu, Some(frame.submission.clone())).await?;
         }
         self.gpu.ends("waiting", Place::Host);
         let header = self.downloaded(frame.params.submission)?;
@@ -118,7 +118,13 @@ impl Engine {
     }
 
     /// Adds `total` pairs to the list: those that came with the header, then the others in as many steps as needed.
-    fn fetch(&mut self, frame: &mut Frame, total: u64, pairs: &mut Pairs, workers: &Workers) -> Result<(), Failure> {
+    async fn fetch(
+        &mut self,
+        frame: &mut Frame,
+        total: u64,
+        pairs: &mut Pairs,
+        workers: &Workers,
+    ) -> Result<(), Failure> {
         let mut have = total.min(frame.sent).min(u64::from(frame.params.capacity));
         self.append(have, pairs, workers)?;
         if have == total {
@@ -146,7 +152,7 @@ impl Engine {
             let from = (have - u64::from(window)) * PAIR;
             encoder.copy_buffer_to_buffer(self.output.pairs(), from, self.download.buffer(), PAIRS_AT, count * PAIR);
             let submission = self.submit_mapped(encoder, PAIRS_AT + count * PAIR)?;
-            self.gpu.wait(submission)?;
+            self.download.wait(&self.gpu, Some(submission)).await?;
             self.append(count, pairs, workers)?;
             have += count;
         }

@@ -5,6 +5,7 @@ use crate::look::Look;
 use crate::output::Output;
 use crate::params::{Header, Params};
 use crate::{Gpus, first_for_tests};
+use pollster::block_on;
 use sapwise::Aabb;
 use sapwise::error::GpuErrorKind;
 use sapwise::internals::{SampledBoxes, Workers};
@@ -42,12 +43,12 @@ fn plan(engine: &Engine, boxes: &[Aabb]) -> Params {
 }
 
 fn start(engine: &mut Engine, boxes: &[Aabb]) {
-    engine.start(boxes, None, |engine| plan(engine, boxes), &Workers::one()).unwrap();
+    block_on(engine.start(boxes, None, |engine| plan(engine, boxes), &Workers::one())).unwrap();
 }
 
 fn finish(engine: &mut Engine) -> Result<usize, Failure> {
     let mut pairs = Pairs::new();
-    engine.finish(&mut pairs, &Workers::one()).map(|()| pairs.len())
+    block_on(engine.finish(&mut pairs, &Workers::one())).map(|()| pairs.len())
 }
 
 fn assert_inert(found: Result<usize, Failure>) {
@@ -64,9 +65,9 @@ fn rows_go_on_after_their_budget() {
             let mut engine = Engine::new(gpus.open(index).unwrap(), method).unwrap();
             for budget in [7, 100] {
                 let plan = |engine: &Engine| Params { budget, ..plan(engine, &boxes) };
-                engine.start(&boxes, None, plan, &Workers::one()).unwrap();
+                block_on(engine.start(&boxes, None, plan, &Workers::one())).unwrap();
                 let mut pairs = Pairs::with_order(PairOrder::Canonical);
-                engine.finish(&mut pairs, &Workers::one()).unwrap();
+                block_on(engine.finish(&mut pairs, &Workers::one())).unwrap();
                 pairs.finish().unwrap();
                 assert!(pairs.as_slice() == expected, "{method} on gpu{index}, {budget} candidates at a time");
             }
@@ -87,8 +88,8 @@ fn resident_pairs_of_several_submissions_are_contiguous() {
         // The list of pairs grows in the middle of the first frame, and has room for the second.
         for _ in 0..2 {
             let params = Params { budget: 20, ..plan(&engine, &boxes) };
-            engine.start_resident(&buffer, params).unwrap();
-            let (count, sample) = engine.finish_resident().unwrap();
+            block_on(engine.start_resident(&buffer, params)).unwrap();
+            let (count, sample) = block_on(engine.finish_resident()).unwrap();
             assert_eq!(count as usize, expected.len(), "{method}");
             assert!(Look::at(&sample).sample.extent[0] > 0.0);
             assert_eq!(pairs_on_cpu(&engine, count), expected, "{method}");
