@@ -1,4 +1,4 @@
-import { BroadPhase } from "./sapwise.js";
+import { BroadPhase, Gpu } from "./sapwise.js";
 
 /** Milliseconds that a frame of a fixed algorithm may take. Above, it waits for fewer objects. */
 const PATIENCE = 100;
@@ -47,6 +47,53 @@ export class Contestant {
       this.#seen = { objects, ms: Math.min(ms, Math.max(2 * expected, 1)) };
     } while (objects < boxes.length / 6);
     return ms;
+  }
+
+  free() {
+    this.#phase.free();
+  }
+}
+
+/** A promise of the GPU, once an algorithm on it was asked for. */
+let gpu = null;
+
+/** A fixed algorithm on WebGPU. When a frame is done it takes the boxes of the newest. */
+export class GpuContestant {
+  #phase;
+  #failed;
+  #busy = false;
+  /** Of the last frame that is done, from the boxes to the pairs in the memory of the CPU; undefined before. */
+  #ms;
+
+  /** Rejects if there is no WebGPU. Calls `failed` with the error if the GPU is lost later. */
+  static async open(algorithm, failed) {
+    const made = new GpuContestant();
+    made.#failed = failed;
+    try {
+      made.#phase = await (await (gpu ??= Gpu.open())).broadPhase(algorithm);
+    } catch (error) {
+      gpu = null;
+      throw error;
+    }
+    return made;
+  }
+
+  /** Begins a frame if the previous one is done. @returns the milliseconds of the last one */
+  run(boxes) {
+    if (!this.#busy) this.#find(boxes);
+    return this.#ms;
+  }
+
+  async #find(boxes) {
+    this.#busy = true;
+    const start = performance.now();
+    try {
+      await this.#phase.update(boxes);
+      [this.#ms, this.#busy] = [performance.now() - start, false];
+    } catch (error) {
+      gpu = null;
+      this.#failed(error);
+    }
   }
 
   free() {

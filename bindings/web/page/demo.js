@@ -1,5 +1,5 @@
 import { BroadPhase, Scene } from "./sapwise.js";
-import { Contestant } from "./contestant.js";
+import { Contestant, GpuContestant } from "./contestant.js";
 import { Encounters } from "./encounters.js";
 
 /** Frames that are remembered: ten seconds at 60 a second. */
@@ -61,11 +61,14 @@ export class Demo {
     }
   }
 
-  /** Runs a fixed algorithm too, or no longer. Throws if this browser cannot. */
-  compare(algorithm, wanted) {
+  /** Runs a fixed algorithm too, or no longer. Rejects if this browser cannot; calls `failed` if it can no longer. */
+  async compare(algorithm, wanted, failed) {
     this.fixed.get(algorithm)?.free();
     this.fixed.delete(algorithm);
-    if (wanted) this.fixed.set(algorithm, new Contestant(algorithm));
+    if (!wanted) return;
+    const lost = (error) => this.compare(algorithm, false).then(() => failed(error));
+    const onGpu = algorithm.includes("@gpu");
+    this.fixed.set(algorithm, onGpu ? await GpuContestant.open(algorithm, lost) : new Contestant(algorithm));
   }
 
   /** Moves the objects by a frame and finds their pairs. */

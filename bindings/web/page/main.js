@@ -1,4 +1,4 @@
-import init, { algorithms, scenarios } from "./sapwise.js";
+import init, { algorithms, Gpu, scenarios } from "./sapwise.js";
 import { clockResolution } from "./contestant.js";
 import { Demo } from "./demo.js";
 import { count } from "./format.js";
@@ -28,8 +28,9 @@ await init().catch((error) => {
   throw error;
 });
 export const demo = new Demo(SCENE, FIRST);
-const timeline = new Timeline($("timeline"), algorithms(), clockResolution());
-const panel = new Panel(algorithms(), scenarios(), (algorithm, wanted) => demo.compare(algorithm, wanted));
+const all = [...algorithms(), ...Gpu.algorithms()];
+const timeline = new Timeline($("timeline"), all, clockResolution());
+const panel = new Panel(all, scenarios(), (...choice) => demo.compare(...choice));
 let [stage, hands] = [null, null];
 try {
   stage = new Stage($("stage"), await shaders);
@@ -37,7 +38,7 @@ try {
 } catch (error) {
   panel.notice(`The boxes cannot be drawn, since ${error.message}. Everything else works.`);
 }
-new ProbeView(algorithms());
+new ProbeView(all);
 
 /** Pauses or goes on. */
 export function run(wanted) {

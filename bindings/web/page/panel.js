@@ -35,7 +35,7 @@ export class Panel {
   #algorithms;
   #rows = new Map();
 
-  /** `compare(algorithm, wanted)` is called at a switch; what it throws is shown. */
+  /** `compare(algorithm, wanted, failed)` is called at a switch; what it rejects with is shown. */
   constructor(algorithms, scenarios, compare) {
     this.#algorithms = algorithms;
     const known = Object.keys(SCENES).filter((name) => scenarios.includes(name));
@@ -45,13 +45,19 @@ export class Panel {
     algorithms.forEach((algorithm, index) => {
       const box = element("input", { type: "checkbox" });
       const [ms, ratio] = [element("span", {}), element("span", {})];
-      box.addEventListener("change", () => {
+      const failed = (error) => {
+        [box.checked, box.disabled] = [false, false];
+        this.notice(`${label(algorithm)} cannot run in this browser: ${error.message ?? error}`);
+      };
+      box.addEventListener("change", async () => {
+        // A GPU opens later.
+        box.disabled = true;
         try {
-          compare(algorithm, box.checked);
+          await compare(algorithm, box.checked, failed);
+          box.disabled = false;
           this.notice("");
         } catch (error) {
-          box.checked = false;
-          this.notice(`${label(algorithm)} cannot run in this browser: ${error.message ?? error}`);
+          failed(error);
         }
       });
       this.#rows.set(algorithm, [ms, ratio]);

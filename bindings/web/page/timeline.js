@@ -3,6 +3,8 @@ import { colours, count, hue, label, power } from "./format.js";
 
 /** Heights in CSS pixels: the band, the captions of the curves, and the curve of the objects. */
 const [BAND, CAPTION, OBJECTS] = [26, 26, 44];
+/** Height of the strip under the band. */
+const STRIP = 5;
 /** Width of the labels of the axes in CSS pixels. */
 const LEFT = 52;
 /** Most frames over which short ones are averaged. */
@@ -77,6 +79,13 @@ export class Timeline {
         this.#text(name, x(from) + wide / 2, BAND / 2 + 0.5, "center", "on-hue");
       }
     }
+    // Below, an algorithm that ran beside it on the GPU.
+    history.forEach(({ fixed }, frame) => {
+      const onGpu = [...fixed.keys()].find((name) => name.includes("@gpu"));
+      if (!onGpu) return;
+      context.fillStyle = this.#colour(onGpu);
+      context.fillRect(x(frame), BAND, x(frame + 1) - x(frame) + 0.5, STRIP);
+    });
   }
 
   #times(history, x, top, bottom) {

@@ -6,6 +6,7 @@ mod broad_phase;
 mod clock;
 mod fault;
 mod find;
+mod gpu;
 mod memberships;
 mod probe;
 mod scene;

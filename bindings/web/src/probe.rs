@@ -5,19 +5,26 @@ mod sweep;
 
 use crate::arrays::object;
 use crate::clock::{milliseconds, tick_ms};
-use crate::fault::call;
+use crate::fault::{call, error};
+use crate::gpu::{WebGpu, entries};
 use crate::tuning::predicted;
-use js_sys::{Date, Reflect};
+use js_sys::{Array, Date, Promise, Reflect};
 use parameters::Parameters;
 use sapwise::Registry;
 use sapwise::algorithm::{Entry, Load, SimdLevel};
 use sapwise::internals::splitmix::mix;
+use sapwise_gpu::AsyncBroadPhase;
+use sapwise_tune::hardware::{GpuHardware, GpuIdentity, GpuParameterId, Statistic};
 use sapwise_tune::json::{self, Format};
-use sapwise_tune::{Hardware, Machine};
+use sapwise_tune::{Hardware, Machine, Parameter};
 use serde_json::{Value, json};
 use std::cell::RefCell;
+use std::rc::Rc;
 use sweep::Sweep;
 use wasm_bindgen::prelude::*;
+use wasm_bindgen_futures::future_to_promise;
+
+const UNDER_WAY: &str = "a step is under way: await it";
 
 /// Whether this module is built with the vectors of WebAssembly.
 const SIMD: bool = cfg!(target_feature = "simd128");
@@ -45,10 +52,10 @@ export interface Progress {
 ";
 
 /// Measures this machine as a page can, within a minute: clock, latency and bandwidth of memory, then every algorithm
-/// over three scenarios. Call `step` until `done` equals `of`. `report` returns what was measured until then. Works
+/// over three scenarios. Await `step` until `done` equals `of`. `report` returns what was measured until then. Works
 /// in a worker, too.
 #[wasm_bindgen]
-pub struct Probe(RefCell<State>);
+pub struct Probe(Rc<RefCell<Option<State>>>);
 
 struct State {
     began_ms: f64,
@@ -57,6 +64,7 @@ struct State {
     parameters: Parameters,
     sweep: Sweep,
     text: String,
+    gpu: Option<GpuHardware>,
 }
 
 impl State {
@@ -67,14 +75,91 @@ impl State {
     }
 
     fn hardware(&self) -> Hardware {
-        self.parameters.hardware(machine())
+        self.parameters.hardware(machine()).with_gpus(self.gpu.iter().cloned().collect())
+    }
+
+    /// Measures for some milliseconds.
+    async fn step(&mut self) -> JsValue {
+        let started = milliseconds();
+        while self.done() < Self::OF && milliseconds() - started < STEP_MS {
+            if self.measured < Parameters::STEPS {
+                self.text = self.parameters.step(self.measured).to_owned();
+                self.measured += 1;
+            } else {
+                self.text = self.sweep.step().await;
+            }
+        }
+        let text = if self.done() < Self::OF { format!("{}.", self.text) } else { "Done.".to_owned() };
+        object([("done", self.done().into()), ("of", Self::OF.into()), ("text", text.into())])
+    }
+
+    fn report(&self) -> Result<String, JsError> {
+        let isolated = Reflect::get(&js_sys::global(), &"crossOriginIsolated".into());
+        let isolated = isolated.is_ok_and(|isolated| isolated.is_truthy());
+        let mut remarks = vec![format!(
+            "the clock of the browser ticks every {:.4} ms, and the page is {}cross-origin isolated; a sample is \
+             the mean of the frames of at least {} ms",
+            self.tick_ms,
+            if isolated { "" } else { "not " },
+            self.parameters.least_ms
+        )];
+        remarks.extend(self.sweep.remarks.iter().cloned());
+        if self.done() < Self::OF {
+            remarks.push(format!("unfinished: {} of {} parts are done", self.done(), Self::OF));
+        }
+        let algorithm = |entry: Entry| json!({"id": entry.id, "revision": entry.revision});
+        let algorithms = Registry::new().available().into_iter();
+        let on_gpu = self.gpu.iter().flat_map(|_| entries());
+        let algorithms: Vec<_> = algorithms.chain(on_gpu).map(algorithm).collect();
+        let date: String = Date::new_0().to_iso_string().into();
+        let seconds = ((milliseconds() - self.began_ms) / 100.0).ceil() / 10.0;
+        let report = json!({
+            "label": "real_browser",
+            "provenance": {
+                "version": env!("CARGO_PKG_VERSION"), "date": date[..10], "command": "probe in a browser",
+                "seed": SEED, "threads": 1, "simd": null, "optimised": !cfg!(debug_assertions), "seconds": seconds,
+            },
+            "hardware": self.hardware(),
+            "algorithms": algorithms,
+            "points": self.sweep.points.iter().map(|point| &point.1).collect::<Vec<_>>(),
+            "remarks": remarks,
+        });
+        Ok(Format::new("report", 3).write(&report)?)
+    }
+
+    fn prediction(&self) -> Result<String, JsError> {
+        if self.sweep.points.is_empty() {
+            return Ok("[]".to_owned());
+        }
+        let tuning = predicted(&self.hardware())?;
+        let of_point = |(load, point): &(Load, Value)| {
+            let scenario = point["scenario"].clone();
+            let row = |cost: &sapwise::tuning::AlgorithmCost| {
+                let (id, ns) = (&cost.algorithm, cost.curve.cost_ns(load));
+                json!({"scenario": scenario, "objects": load.objects, "algorithm": id, "ns": ns})
+            };
+            tuning.costs.iter().map(row).collect::<Vec<_>>()
+        };
+        Ok(json!(self.sweep.points.iter().flat_map(of_point).collect::<Vec<_>>()).to_string())
     }
 }
 
 /// Reads a text of an object of the global scope.
-fn told(object: &str, name: &str) -> Option<JsValue> {
+pub(crate) fn told(object: &str, name: &str) -> Option<JsValue> {
     let object = Reflect::get(&js_sys::global(), &object.into()).ok().filter(JsValue::is_object)?;
     Reflect::get(&object, &name.into()).ok()
+}
+
+/// Returns the parameters of a GPU from an object of samples.
+fn of_gpu(samples: &JsValue) -> Vec<Parameter> {
+    let how = "through WebGPU from a worker, with the way from the worker to the GPU and back";
+    let parameter = |id: GpuParameterId| {
+        let raw = Reflect::get(samples, &id.as_str().into()).ok().filter(Array::is_array)?;
+        let raw = Array::from(&raw).iter().filter_map(|sample| sample.as_f64()).collect();
+        Some(Parameter::from_samples(id, Statistic::Median, raw, how))
+    };
+    let missing = |id| Parameter::missing(id, "WebGPU does not report it");
+    GpuParameterId::OF_ONE.into_iter().map(|id| parameter(id).unwrap_or_else(|| missing(id))).collect()
 }
 
 /// Returns the machine as far as a browser tells: its name and version, system and processors, as every page sees them.
@@ -111,89 +196,60 @@ impl Probe {
             let least_ms = (LEAST_MS.max(TICKS * tick_ms) * 10.0).ceil() / 10.0;
             let (parameters, sweep) = (Parameters::new(least_ms), Sweep::new(least_ms, SEED));
             let began_ms = milliseconds();
-            Ok(Self(RefCell::new(State { began_ms, tick_ms, measured: 0, parameters, sweep, text: String::new() })))
+            let text = String::new();
+            let state = State { began_ms, tick_ms, measured: 0, parameters, sweep, text, gpu: None };
+            Ok(Self(Rc::new(RefCell::new(Some(state)))))
+        })
+    }
+
+    /// Adds WebGPU before the first step: `parameters` maps names of `sapwise schema` to samples, and `name` is the
+    /// GPU's. Rejects if the GPU refuses an algorithm; the probe can go on without it.
+    #[wasm_bindgen(js_name = addGpu)]
+    pub async fn add_gpu(&self, gpu: &WebGpu, name: String, parameters: JsValue) -> Result<(), JsError> {
+        let identity = GpuIdentity::new(0, name, gpu.0.identity().kind).with_driver("", "", "webgpu");
+        let mut added = Vec::new();
+        for entry in entries() {
+            added.push(AsyncBroadPhase::new(&gpu.0, entry.id.method()).await?);
+        }
+        self.with(|state| {
+            state.gpu = Some(GpuHardware::new(identity, of_gpu(&parameters)));
+            added.into_iter().for_each(|algorithm| state.sweep.add(algorithm));
+            Ok(())
         })
     }
 
     /// Measures for some milliseconds, in a slow browser tenths of a second.
-    #[wasm_bindgen(unchecked_return_type = "Progress")]
-    pub fn step(&self) -> Result<JsValue, JsError> {
+    #[wasm_bindgen(unchecked_return_type = "Promise<Progress>")]
+    pub fn step(&self) -> Result<Promise, JsError> {
         call(|| {
-            let state = &mut *self.0.borrow_mut();
-            let started = milliseconds();
-            while state.done() < State::OF && milliseconds() - started < STEP_MS {
-                if state.measured < Parameters::STEPS {
-                    state.text = state.parameters.step(state.measured).to_owned();
-                    state.measured += 1;
-                } else {
-                    state.text = state.sweep.step();
-                }
-            }
-            let text = if state.done() < State::OF { format!("{}.", state.text) } else { "Done.".to_owned() };
-            Ok(object([("done", state.done().into()), ("of", State::OF.into()), ("text", text.into())]))
+            let home = Rc::clone(&self.0);
+            let Some(mut state) = home.take() else { return error(UNDER_WAY) };
+            Ok(future_to_promise(async move {
+                let progress = state.step().await;
+                home.replace(Some(state));
+                Ok(progress)
+            }))
         })
+    }
+
+    fn with<T>(&self, run: impl FnOnce(&mut State) -> Result<T, JsError>) -> Result<T, JsError> {
+        call(|| self.0.borrow_mut().as_mut().map_or_else(|| error(UNDER_WAY), run))
     }
 
     /// Returns the report: the text of a file that `sapwise check` checks and `sapwise study` shows. It names no
     /// person and no machine.
     pub fn report(&self) -> Result<String, JsError> {
-        call(|| {
-            let state = &*self.0.borrow();
-            let isolated = Reflect::get(&js_sys::global(), &"crossOriginIsolated".into());
-            let isolated = isolated.is_ok_and(|isolated| isolated.is_truthy());
-            let mut remarks = vec![format!(
-                "the clock of the browser ticks every {:.4} ms, and the page is {}cross-origin isolated; a sample is \
-                 the mean of the frames of at least {} ms",
-                state.tick_ms,
-                if isolated { "" } else { "not " },
-                state.parameters.least_ms
-            )];
-            remarks.extend(state.sweep.remarks.iter().cloned());
-            if state.done() < State::OF {
-                remarks.push(format!("unfinished: {} of {} parts are done", state.done(), State::OF));
-            }
-            let algorithm = |entry: Entry| json!({"id": entry.id, "revision": entry.revision});
-            let algorithms: Vec<_> = Registry::new().available().into_iter().map(algorithm).collect();
-            let date: String = Date::new_0().to_iso_string().into();
-            let seconds = ((milliseconds() - state.began_ms) / 100.0).ceil() / 10.0;
-            let report = json!({
-                "label": "real_browser",
-                "provenance": {
-                    "version": env!("CARGO_PKG_VERSION"), "date": date[..10], "command": "probe in a browser",
-                    "seed": SEED, "threads": 1, "simd": null, "optimised": !cfg!(debug_assertions), "seconds": seconds,
-                },
-                "hardware": state.hardware(),
-                "algorithms": algorithms,
-                "points": state.sweep.points.iter().map(|point| &point.1).collect::<Vec<_>>(),
-                "remarks": remarks,
-            });
-            Ok(Format::new("report", 3).write(&report)?)
-        })
+        self.with(|state| state.report())
     }
 
     /// Returns what the built-in model predicts for this machine at each point of the report, as JSON: a list of
     /// objects with `scenario`, `objects`, `algorithm` and `ns`.
     pub fn prediction(&self) -> Result<String, JsError> {
-        call(|| {
-            let state = &*self.0.borrow();
-            if state.sweep.points.is_empty() {
-                return Ok("[]".to_owned());
-            }
-            let tuning = predicted(&state.hardware())?;
-            let of_point = |(load, point): &(Load, Value)| {
-                let scenario = point["scenario"].clone();
-                let row = |cost: &sapwise::tuning::AlgorithmCost| {
-                    let (id, ns) = (&cost.algorithm, cost.curve.cost_ns(load));
-                    json!({"scenario": scenario, "objects": load.objects, "algorithm": id, "ns": ns})
-                };
-                tuning.costs.iter().map(row).collect::<Vec<_>>()
-            };
-            Ok(json!(state.sweep.points.iter().flat_map(of_point).collect::<Vec<_>>()).to_string())
-        })
+        self.with(|state| state.prediction())
     }
 
     /// Returns the tuning that the built-in model predicts for this machine, for `useTuning`.
     pub fn tuning(&self) -> Result<String, JsError> {
-        call(|| Ok(json::write_tuning(&predicted(&self.0.borrow().hardware())?)?))
+        self.with(|state| Ok(json::write_tuning(&predicted(&state.hardware())?)?))
     }
 }

@@ -40,8 +40,8 @@
 //! | `grid-sap` | counting sort into the slots of a grid of strips; oversized boxes go into a tree |
 //! | `bvh` | a tree over all boxes, in the order of a Hilbert curve; eight consecutive boxes form a node |
 //!
-//! In a browser nothing may wait. There, `Gpu::in_browser` opens WebGPU and `AsyncBroadPhase` runs a method, by the same
-//! code; everything else of this package that waits is for other systems. Enable the feature `webgpu`.
+//! In a browser nothing may wait. With the feature `webgpu`, `Gpu::in_browser` opens WebGPU there and `AsyncBroadPhase`
+//! runs a method, by the same code; everything else of this package that waits is for other systems.
 //!
 //! A GPU that is lost, refuses memory, executes nothing or does not answer within a minute is
 //! [`Error::Unavailable`](sapwise::Error). [`Adaptive`](sapwise::Adaptive) then runs the same frame on another

@@ -4,6 +4,7 @@ use crate::clock::milliseconds;
 use sapwise::algorithm::{Displacement, Entry, Load};
 use sapwise_tune::stats::median;
 use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Pairs, Registry};
+use sapwise_gpu::AsyncBroadPhase;
 use sapwise_scenes::{Random, Scenario};
 use serde_json::{Value, json};
 
@@ -28,10 +29,20 @@ const BRUTE_FROM: u32 = 3000;
 const OBJECTS: usize = 20_000;
 const MOST_PAIRS: usize = 16 << 20;
 
+/// An algorithm on the GPU is out if it is hopeless and a frame takes this long: below, that may be the way there and
+/// back alone, which more objects are worth.
+const GPU_NS: f64 = 20e6;
+
+/// What runs.
+enum Algorithm {
+    Cpu(Box<dyn BroadPhase>),
+    Gpu(AsyncBroadPhase),
+}
+
 /// An algorithm in the race.
 struct Racer {
     id: AlgorithmId,
-    algorithm: Box<dyn BroadPhase>,
+    algorithm: Algorithm,
     /// Frames that it ran at this point, and the times of those that count.
     frames: usize,
     samples: Vec<u64>,
@@ -60,9 +71,14 @@ pub(super) struct Sweep {
 }
 
 impl Racer {
+    fn new(id: AlgorithmId, algorithm: Algorithm) -> Self {
+        Self { id, algorithm, frames: 0, samples: Vec::new(), error: None, out: false }
+    }
+
     /// An incremental algorithm settles in some frames.
     fn is_warm(&self) -> bool {
-        self.frames > if self.algorithm.is_incremental() { WARM_UP } else { 1 }
+        let settles = matches!(&self.algorithm, Algorithm::Cpu(algorithm) if algorithm.is_incremental());
+        self.frames > if settles { WARM_UP } else { 1 }
     }
 
     fn median_ns(&self) -> Option<f64> {
@@ -70,11 +86,15 @@ impl Racer {
     }
 
     /// Runs frames until the clock can time them; the first one alone. Returns the nanoseconds of one.
-    fn run(&mut self, frames: &[Vec<Aabb>], pairs: &mut Pairs, least_ms: f64) -> Result<f64, Error> {
+    async fn run(&mut self, frames: &[Vec<Aabb>], pairs: &mut Pairs, least_ms: f64) -> Result<f64, Error> {
         let (started, round, mut ran, mut look) = (milliseconds(), 2 * frames.len() - 2, 0, 1);
         loop {
             let at = self.frames % round;
-            self.algorithm.find_pairs(&frames[at.min(round - at)], pairs)?;
+            let boxes = &frames[at.min(round - at)];
+            match &mut self.algorithm {
+                Algorithm::Cpu(algorithm) => algorithm.find_pairs(boxes, pairs)?,
+                Algorithm::Gpu(algorithm) => algorithm.find_pairs(boxes, pairs).await?,
+            }
             (self.frames, ran) = (self.frames + 1, ran + 1);
             if ran == look {
                 let ms = milliseconds() - started;
@@ -110,15 +130,20 @@ impl Sweep {
         }
     }
 
+    /// Adds an algorithm on the GPU. It stays for all scenarios.
+    pub(super) fn add(&mut self, algorithm: AsyncBroadPhase) {
+        self.racers.push(Racer::new(algorithm.id().clone(), Algorithm::Gpu(algorithm)));
+    }
+
     /// Begins a point, or runs each algorithm once, or ends the point. Returns it in words.
-    pub(super) fn step(&mut self) -> String {
+    pub(super) async fn step(&mut self) -> String {
         let (scenario, objects) = (SCENARIOS[self.done / SIZES.len()], SIZES[self.done % SIZES.len()]);
         let racing = |racer: &&Racer| !racer.out;
         let rounds = self.racers.iter().filter(racing).map(|racer| racer.samples.len()).min().unwrap_or(ROUNDS);
         if self.frames.is_empty() {
             self.begin(scenario, objects);
         } else if rounds < if self.spent_ms(0) > SCENARIO_MS { FEWEST } else { ROUNDS } {
-            self.round();
+            self.round().await;
         } else {
             self.end(scenario, objects);
         }
@@ -137,9 +162,11 @@ impl Sweep {
             let registry = Registry::new();
             let made = |entry: Entry| {
                 let algorithm = registry.create(&entry.id).ok()?;
-                Some(Racer { id: entry.id, algorithm, frames: 0, samples: Vec::new(), error: None, out: false })
+                Some(Racer::new(entry.id, Algorithm::Cpu(algorithm)))
             };
-            self.racers = registry.available().into_iter().filter_map(made).collect();
+            self.racers.retain(|racer| matches!(racer.algorithm, Algorithm::Gpu(_)));
+            self.racers.iter_mut().for_each(|racer| racer.out = false);
+            self.racers.extend(registry.available().into_iter().filter_map(made));
         }
         let mut scene = scenario.start(objects as usize, self.seed);
         for _ in 0..(OBJECTS / objects as usize).clamp(3, 512) {
@@ -154,15 +181,19 @@ impl Sweep {
     }
 
     /// Runs each algorithm once, in random order. Counts when all are warm.
-    fn round(&mut self) {
+    async fn round(&mut self) {
         let counts = self.racers.iter().all(|racer| racer.out || racer.is_warm());
         for k in self.shuffle.shuffled(self.racers.len()) {
             let racer = &mut self.racers[k];
             if racer.out || !counts && racer.is_warm() {
                 continue;
             }
-            match racer.run(&self.frames, &mut self.pairs, self.least_ms) {
-                Ok(ns) if counts => racer.samples.push((ns as u64).max(1)),
+            match racer.run(&self.frames, &mut self.pairs, self.least_ms).await {
+                Ok(ns) if counts => {
+                    racer.samples.push((ns as u64).max(1));
+                    // One sample of a software GPU is enough: its frames would take the time of all others.
+                    racer.out = matches!(racer.algorithm, Algorithm::Gpu(_)) && ns > GPU_NS;
+                }
                 Ok(_) => {}
                 Err(error) => (racer.error, racer.out) = (Some(error.to_string()), true),
             }
@@ -189,7 +220,11 @@ impl Sweep {
             } else if let Some(ns) = racer.median_ns() {
                 timings.push(json!({"algorithm": racer.id, "samples_ns": racer.samples}));
                 let from = if racer.id.method() == "brute" { BRUTE_FROM } else { JUDGED_FROM };
-                racer.out = objects >= from && ns > HOPELESS * best;
+                let judged = match racer.algorithm {
+                    Algorithm::Cpu(_) => objects >= from,
+                    Algorithm::Gpu(_) => ns > GPU_NS,
+                };
+                racer.out = judged && ns > HOPELESS * best;
             }
         }
         let (pairs, fingerprint) = self.answer.unwrap_or_default();

@@ -104,6 +104,38 @@ async function compareWithDoubleLoop(scene) {
   return new Set(demo.history.map(({ algorithm }) => algorithm)).size;
 }
 
+/** Runs in the page: frames of 2000 boxes on WebGPU against a double loop. */
+async function compareOnGpu(scenarios, frames) {
+  const { Gpu, Scene } = await import("./sapwise.js");
+  const gpu = await Gpu.open();
+  const searches = [];
+  for (const algorithm of Gpu.algorithms()) searches.push([algorithm, await gpu.broadPhase(algorithm)]);
+  for (const scenario of scenarios) {
+    const scene = new Scene(scenario, 2000, 1);
+    for (let frame = 0; frame < frames; frame++, scene.step()) {
+      const boxes = scene.boxes().slice();
+      const right = new Set();
+      for (let a = 0; a < boxes.length; a += 6) {
+        for (let b = a + 6; b < boxes.length; b += 6) {
+          let overlap = true;
+          for (let axis = 0; axis < 3; axis++) {
+            overlap &&= boxes[a + axis] <= boxes[b + 3 + axis] && boxes[b + axis] <= boxes[a + 3 + axis];
+          }
+          if (overlap) right.add(a / 6 * 65536 + b / 6);
+        }
+      }
+      const [algorithm, search] = searches[frame % searches.length];
+      const pairs = await search.update(boxes);
+      const found = new Set();
+      for (let i = 0; i < pairs.length; i += 2) found.add(pairs[i] * 65536 + pairs[i + 1]);
+      if (found.size !== pairs.length / 2 || found.size !== right.size || [...right].some((pair) => !found.has(pair))) {
+        throw new Error(`${algorithm}, ${scenario}, frame ${frame}: ${pairs.length / 2} pairs, not ${right.size}`);
+      }
+    }
+  }
+  return searches.map(([algorithm]) => algorithm).join(", ");
+}
+
 /** Checks a report by the command, which calls it good or, if it is cut short, doubtful. */
 function check(name, report, verdict) {
   const file = join(pictures, `${name}.json`);
@@ -138,6 +170,44 @@ const tests = {
       most = Math.max(most, await page.evaluate(`(${compareWithDoubleLoop})("${scene}")`));
     }
     assert.ok(most > 1, "it never changed the algorithm");
+    await page.close();
+  },
+
+  async "300 frames of 2000 boxes on WebGPU have the pairs of a double loop"() {
+    const page = await open();
+    await pause(page, "uniform", 10);
+    const scenes = ["gravity", "free-fall", "mixed"];
+    const told = await page.evaluate(`(${compareOnGpu})(${JSON.stringify(scenes)}, 100)`);
+    assert.deepEqual(page.errors, []);
+    await page.close();
+    return told;
+  },
+
+  async "without WebGPU it says so and goes on"() {
+    const page = await open({ before: (page) => page.send("Page.addScriptToEvaluateOnNewDocument", { source: `
+      Object.defineProperty(Navigator.prototype, "gpu", { get() {} });` }) });
+    await page.until(FRAME);
+    await page.evaluate(`(${clickOnGpu})()`);
+    await page.until('/, GPU cannot run in this browser: this browser has no WebGPU/.test(notice.textContent)');
+    await goesOn(page);
+    await page.close();
+  },
+
+  async "a GPU that is lost leaves the CPU"() {
+    const page = await open({ before: (page) => page.send("Page.addScriptToEvaluateOnNewDocument", { source: `
+      const request = GPUAdapter.prototype.requestDevice;
+      GPUAdapter.prototype.requestDevice = async function (...how) {
+        return window.device = await request.apply(this, how);
+      };` }) });
+    await page.until(FRAME);
+    await page.evaluate('import("./main.js").then(({ demo }) => demo.restart("uniform", 500))');
+    await page.evaluate(`(${clickOnGpu})()`);
+    const ran = 'import("./main.js").then(({ demo }) => [...demo.history.at(-1).fixed.values()].some((ms) => ms > 0))';
+    await page.until(ran, 60);
+    await page.evaluate("device.destroy()");
+    await page.until('/, GPU cannot run in this browser: .*lost/.test(notice.textContent)');
+    assert.equal(await page.evaluate('document.querySelectorAll("#fixed :checked").length'), 0);
+    await goesOn(page);
     await page.close();
   },
 
@@ -214,9 +284,11 @@ const tests = {
   async "every fixed algorithm runs beside, and the slow ones wait"() {
     const page = await open();
     await page.until(FRAME);
-    await page.evaluate('document.querySelectorAll("#fixed input").forEach((box) => box.click())');
+    // A software GPU takes seconds for so many boxes.
+    const rows = '[...document.querySelectorAll("#fixed label")].filter((row) => !row.textContent.includes("GPU"))';
+    await page.evaluate(`${rows}.forEach((row) => row.click())`);
     await page.evaluate('import("./main.js").then(({ demo }) => demo.restart("uniform", 60000))');
-    await page.until(`[...document.querySelectorAll("#fixed label")].every((row) => /ms|too slow/.test(row.textContent))
+    await page.until(`${rows}.every((row) => /ms|too slow/.test(row.textContent))
       && document.getElementById("count").textContent.startsWith("60")`, 30);
     assert.match(await text(page, "fixed"), /too slow here/);
     assert.deepEqual(page.errors, []);
@@ -319,6 +391,18 @@ const tests = {
     }
   },
 };
+
+/** Runs in the page: compares with the first algorithm on the GPU. */
+function clickOnGpu() {
+  [...document.querySelectorAll("#fixed label")].find((row) => row.textContent.includes("GPU")).click();
+}
+
+/** Checks that frames follow without an error. */
+async function goesOn(page) {
+  const frame = await page.evaluate('import("./main.js").then(({ demo }) => demo.frame)');
+  await page.until(`import("./main.js").then(({ demo }) => demo.frame > ${frame} + 30)`);
+  assert.deepEqual(page.errors, []);
+}
 
 /** Runs in the page: pairs of colours of the style sheet with a contrast under 4.5. */
 function lowContrasts() {

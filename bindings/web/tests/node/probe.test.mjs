@@ -3,7 +3,7 @@ import { writeFileSync } from "node:fs";
 import test from "node:test";
 import { sapwise } from "./common.mjs";
 
-test("a probe ends within a minute, and its report holds what it measured", () => {
+test("a probe ends within a minute, and its report holds what it measured", async () => {
   const { algorithms, BroadPhase, Probe, useTuning } = sapwise;
   const [probe, began] = [new Probe(), performance.now()];
   let last = { done: 0, of: 1 };
@@ -12,7 +12,7 @@ test("a probe ends within a minute, and its report holds what it measured", () =
   assert.equal(probe.prediction(), "[]");
   while (last.done < last.of) {
     const started = performance.now();
-    const progress = probe.step();
+    const progress = await probe.step();
     longest = Math.max(longest, performance.now() - started);
     assert.ok(progress.done >= last.done && progress.text.length > 0);
     last = progress;
