@@ -5,16 +5,23 @@
 #   tools/web.sh            # builds, and tests the package in Node.js
 #   tools/web.sh build      # builds only
 #   tools/web.sh browser    # also tests the page in headless Chromium, and the report of its probe by `sapwise check`
+#   tools/web.sh bench      # measures into results/web.csv, beside libraries from npm; on a quiet machine
+#   tools/web.sh probes     # runs the probe of the page 20 times into results/web-probes.csv: about 20 minutes
 #
+# PROBES   runs of the probe [default: 20]
 # VECTORS  +simd128, or -simd128 for browsers without WebAssembly SIMD [default: +simd128]
 #
-# Needs Node.js with npm, and the compiler of tools/wasm-compiler.sh; `browser` also Chromium. Installs three.js in
-# target/three/, for an example.
+# Needs Node.js with npm, and the compiler of tools/wasm-compiler.sh; all but `test` and `build` also Chromium. Installs
+# three.js in target/three/, for an example, and the libraries in target/web-bench/.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 what=${1:-test}
 . tools/wasm-compiler.sh
-case $what in build | test | browser) ;; *) fail "usage: tools/web.sh [test|build|browser]" ;; esac
+case $what in
+    build | test) ;;
+    browser | bench | probes) command -v chromium >/dev/null || fail "chromium is missing" ;;
+    *) fail "usage: tools/web.sh [test|build|browser|bench|probes]" ;;
+esac
 vectors=${VECTORS:-+simd128}
 root=$PWD
 out=${CARGO_TARGET_DIR:-$root/target}
@@ -40,6 +47,21 @@ echo "web: $(stat -c %s "$out/npm/sapwise_bg.wasm") bytes of WebAssembly; the pa
 [ "$bytes" -le 1500000 ] || fail "the page has more than 1.5 MB"
 [ "$what" != build ] || exit 0
 
+if [ "$what" = bench ] || [ "$what" = probes ]; then
+    export SAPWISE_BROWSER_TESTS=$root/bindings/web/tests/browser
+    rm -rf "$out/web-bench"
+    cp -r bindings/web/bench "$out/web-bench"
+    (cd "$out/web-bench" && npm install --no-audit --no-fund --silent "$out/npm")
+    if [ "$what" = bench ]; then
+        usual build --quiet --release --locked --package sapwise --example find_pairs
+        node "$out/web-bench/run.mjs" bench results/web.csv "$out/web" "$out/release/examples/find_pairs" "$bytes"
+    else
+        usual build --quiet --locked --package sapwise-cli
+        node "$out/web-bench/run.mjs" probes results/web-probes.csv "$out/web" "$out/debug/sapwise" "${PROBES:-20}"
+    fi
+    exit 0
+fi
+
 export SAPWISE_NPM=$out/npm SAPWISE_REPORT=$out/web-report.json
 node --test bindings/web/tests/node/*.test.mjs
 # As a user of three.js installs both.
@@ -48,6 +70,5 @@ cp -r bindings/web/examples/three "$out/three"
 (cd "$out/three" && npm install --no-audit --no-fund --silent "$out/npm" && npm test --silent)
 usual run --quiet --locked -- check "$SAPWISE_REPORT"
 if [ "$what" = browser ]; then
-    command -v chromium >/dev/null || fail "chromium is missing"
     SAPWISE=$out/debug/sapwise node bindings/web/tests/browser/run.mjs "$out/web"
 fi
