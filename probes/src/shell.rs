@@ -17,11 +17,20 @@ pub(crate) fn path(path: &Path) -> String {
     quoted(&path.display().to_string())
 }
 
-/// Returns the command that this process was started with, followed by these words.
+/// Returns the line that names the next command, from the words after the name of this program.
+///
+/// `cargo run` sets `CARGO`: whoever came that way may not have installed the command.
+pub(crate) fn next(words: &str) -> String {
+    let own = std::env::current_exe().is_ok_and(|path| path.file_stem().is_some_and(|stem| stem == "sapwise"));
+    let program = if own && std::env::var_os("CARGO").is_some() { "cargo run --release --" } else { "sapwise" };
+    format!("Next: {program} {words}")
+}
+
+/// Returns the words that this process was started with, followed by these.
 pub(crate) fn again(more: &[&str]) -> String {
     let own = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned());
     let words = own.chain(more.iter().map(|word| (*word).to_owned())).map(|word| quoted(&word));
-    std::iter::once("sapwise".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
+    words.collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]

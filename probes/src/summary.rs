@@ -12,7 +12,7 @@ use sapwise_lab::fit::measured_tuning;
 use sapwise_lab::label_text;
 use sapwise_lab::report::{Label, Report};
 use sapwise_lab::text::{columns, count, grouped};
-use sapwise_tune::hardware::with_unit;
+use sapwise_tune::hardware::{ParameterId, with_unit};
 use sapwise_tune::{GpuHardware, GpuIdentity, Hardware, How, Model, Parameter};
 use std::path::Path;
 
@@ -40,15 +40,15 @@ pub(crate) fn report(report: &Report, terminal: Terminal) -> String {
 }
 
 /// Returns what to do with a written report.
-pub(crate) fn next_step(report: &Report, path: &Path) -> String {
+pub(crate) fn next_step(report: &Report, path: &Path, gpus: &GpuChoice) -> String {
     let path = shell::path(path);
     // A report without a sweep, or one that was interrupted early, holds little but the hardware.
     let next = if measured_tuning(report, usual_scenario(report), None).is_ok() {
-        format!("sapwise run fragmentation --tuning {path}")
+        format!("run fragmentation --tuning {path}{}", gpus.words())
     } else {
-        format!("sapwise predict --report {path}")
+        format!("predict --report {path}{}", gpus.words())
     };
-    format!("\nThe report is in {path}.\nNext: {next}")
+    format!("\nThe report is in {path}.\n{}", shell::next(&next))
 }
 
 /// Describes the parameters of a machine, of each of its GPUs and of groups of GPUs, as tables.
@@ -100,9 +100,9 @@ fn parameters(parameters: &[Parameter], terminal: Terminal) -> String {
         };
         let spread = p.dispersion.map_or(String::new(), |d| format!("{:.1} %", d * 100.0));
         let disturbed = p.foreign_load.filter(|&load| load > 0.05);
-        let disturbed = disturbed.map_or(String::new(), |load| format!(", foreign load {:.0} %", load * 100.0));
+        let disturbed = disturbed.map_or(String::new(), |load| format!(", {:.0} % foreign", load * 100.0));
         let how = match p.how {
-            How::Measured => format!("measured, {}{disturbed}", count(p.samples as usize, "sample")),
+            How::Measured => format!("{}{disturbed}", count(p.samples as usize, "sample")),
             How::Reported => "reported".to_owned(),
             How::Published => "published".to_owned(),
             How::Missing => format!("missing: {}", p.source),
@@ -113,34 +113,57 @@ fn parameters(parameters: &[Parameter], terminal: Terminal) -> String {
     terminal.table(&rows)
 }
 
-/// Describes the steps of a slice, with where each begins and the interval of that.
+/// Describes a prediction in at most a dozen lines: the machine, the steps of a slice, and one line on all warnings.
+pub(crate) fn prediction(hardware: &Hardware, tuning: &Tuning, terminal: Terminal) -> String {
+    let machine = &hardware.machine;
+    let cores = hardware.value(ParameterId::UsableCores).unwrap_or(1.0) as usize;
+    let mut text = format!("{}, {}, {}\n\n", machine.cpu, count(cores, "core"), machine.simd);
+    text += &steps(tuning, terminal, false);
+    text += "@cpu2: on 2 threads. A program chooses anew in each frame, by its own boxes.\n";
+    let warning = match &tuning.warnings[..] {
+        [] => return text,
+        many if tuning.extrapolated => {
+            format!("this machine is unlike those of the training ({} by --verbose)", count(many.len(), "warning"))
+        }
+        [only] => only.clone(),
+        [first, more @ ..] => format!("{first} ({} more by --verbose)", more.len()),
+    };
+    text + &format!("{} {warning}\n", terminal.warning("warning:"))
+}
+
+/// Describes the steps of a slice, why there are no intervals, and what is doubtful.
 pub(crate) fn tuning(tuning: &Tuning, terminal: Terminal) -> String {
-    let mut rows = Vec::new();
-    for step in &tuning.steps {
-        // The first step begins at 0 without a crossover.
-        let crossover =
-            tuning.crossovers.iter().find(|b| b.above == step.algorithm && b.objects as u32 == step.from_objects);
-        let interval = crossover.and_then(Crossover::interval).map_or(String::new(), |(low, high)| {
-            if is_whole_slice((low, high)) {
-                return "anywhere: both cost about the same".to_owned();
-            }
-            format!("{} to {}", grouped(low.round() as u64), grouped(high.round() as u64))
-        });
-        let from = format!("  from {}", grouped(u64::from(step.from_objects)));
-        rows.push(vec![from, step.algorithm.to_string(), interval]);
-    }
-    let told = |b: &Crossover| b.interval().is_some();
-    let with = if tuning.crossovers.iter().any(told) { ", with 90 % intervals" } else { "" };
-    let head = format!("{}: the fastest algorithm by number of objects{with}", tuning.scenario);
-    let mut text = format!("{}\n", terminal.head(&head));
-    text.push_str(&columns(&rows));
-    if !tuning.crossovers.iter().all(told) {
+    let mut text = steps(tuning, terminal, true);
+    if !tuning.crossovers.iter().all(|b| b.interval().is_some()) {
         text.push_str(&format!("  {}\n", tuning.interval_basis));
     }
     for warning in &tuning.warnings {
         text.push_str(&format!("  {} {warning}\n", terminal.warning("warning:")));
     }
     text
+}
+
+/// Describes the steps of a slice, with where each begins and the interval of that. Without `all`, leaves out a step
+/// that costs about the same as the one before it, wherever it begins.
+fn steps(tuning: &Tuning, terminal: Terminal, all: bool) -> String {
+    let mut rows = Vec::new();
+    for step in &tuning.steps {
+        // The first step begins at 0 without a crossover.
+        let crossover =
+            tuning.crossovers.iter().find(|b| b.above == step.algorithm && b.objects as u32 == step.from_objects);
+        let interval = match crossover.and_then(Crossover::interval) {
+            Some(whole) if is_whole_slice(whole) && !all => continue,
+            Some(whole) if is_whole_slice(whole) => "anywhere: both cost about the same".to_owned(),
+            Some((low, high)) => format!("{} to {}", grouped(low.round() as u64), grouped(high.round() as u64)),
+            None => String::new(),
+        };
+        let from = format!("  from {}", grouped(u64::from(step.from_objects)));
+        rows.push(vec![from, step.algorithm.to_string(), interval]);
+    }
+    let told = |b: &Crossover| b.interval().is_some();
+    let with = if tuning.crossovers.iter().any(told) { ", with 90 % intervals" } else { "" };
+    let head = format!("Fastest by number of objects in the scenario {}{with}", tuning.scenario);
+    format!("{}\n{}", terminal.head(&head), columns(&rows))
 }
 
 fn scenarios(report: &Report) -> Vec<&str> {

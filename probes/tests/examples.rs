@@ -40,7 +40,7 @@ fn shell(line: &str, folder: &Path) -> Output {
     let program = assert_cmd::cargo::cargo_bin!("sapwise");
     let path = format!("{}:{}", program.parent().unwrap().display(), std::env::var("PATH").unwrap_or_default());
     let mut command = Command::new("sh");
-    command.env("PATH", path).env_remove("SAPWISE_SIMD");
+    command.env("PATH", path).env_remove("SAPWISE_SIMD").env_remove("CARGO");
     command.args(["-c", line]).current_dir(folder).output().unwrap()
 }
 
@@ -64,6 +64,18 @@ fn verbs() -> Vec<String> {
     let list = help.split("Commands:\n").nth(1).unwrap().split("\n\n").next().unwrap();
     let names = list.lines().filter(|line| line.starts_with("  ") && !line.starts_with("   "));
     names.filter_map(|line| line.split_whitespace().next()).filter(|name| *name != "help").map(str::to_owned).collect()
+}
+
+/// `tools/results.sh predict` writes it anew, after a change of the model or of its sample.
+#[test]
+fn the_sample_of_the_readme_is_what_predict_prints() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let report = root.join("datasets/amd-epyc-zen3-2c/full.json");
+    let text = success(sapwise().args(["predict", "--report"]).arg(report));
+    let (sample, next) = text.split_once("Next: ").unwrap();
+    assert_eq!(sample, fs::read_to_string(root.join("results/predict.txt")).unwrap());
+    assert!(sample.lines().count() < 12 && sample.lines().all(|line| line.chars().count() <= 80), "{text}");
+    assert!(next.starts_with("sapwise predict --report "), "{next}");
 }
 
 #[test]

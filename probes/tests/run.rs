@@ -81,8 +81,10 @@ fn a_run_compares_the_choice_over_all_frames_and_over_parts() {
     let ran = told["frames_run"].as_object().unwrap();
     assert_eq!(ran.values().map(|count| count.as_u64().unwrap()).sum::<u64>(), 30, "{told}");
     let text = success(&mut run("uniform", &tuning, &["--objects", "1", "--frames", "1", "--repeats", "1"]));
-    assert!(text.starts_with("uniform, 1 frame of 1 object, medians of 1 repeat"), "{text}");
-    for needed in ["With one repeat", "Without learning.", "written by hand", "adaptive ran it in", "Adaptive takes "] {
+    assert!(text.starts_with("Adaptive takes "), "{text}");
+    for needed in
+        ["With one repeat", "Without learning.", "written by hand", "chosen in", "\nuniform, 1 frame of 1 object, "]
+    {
         assert!(text.contains(needed), "{needed}: {text}");
     }
 }

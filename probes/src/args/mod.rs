@@ -92,6 +92,9 @@ pub(crate) struct Predict {
     /// Where the tuning goes. With a folder of reports: the folder for the tunings, created if missing.
     #[arg(long, value_name = "T.json")]
     pub(crate) out: Option<PathBuf>,
+    /// Also print every hardware parameter and every warning.
+    #[arg(long, conflicts_with = "json")]
+    pub(crate) verbose: bool,
     /// Print the tuning instead of a summary.
     #[arg(long)]
     pub(crate) json: bool,

@@ -44,6 +44,13 @@ impl GpuChoice {
         }
     }
 
+    /// Returns the options as they were given, for another command, each after a blank.
+    pub(crate) fn words(&self) -> String {
+        let flags = [(self.no_gpus, " --no-gpus"), (self.software_gpus, " --software-gpus")];
+        let only = self.only.iter().map(|k| format!(" --gpu {k}"));
+        flags.into_iter().filter(|(given, _)| *given).map(|(_, word)| word.to_owned()).chain(only).collect()
+    }
+
     /// Removes other GPUs from the timings of a report; its hardware stays.
     pub(crate) fn restrict(&self, report: &mut Report) {
         let wanted: Vec<u32> =
@@ -58,13 +65,10 @@ impl GpuChoice {
         if self.no_gpus || !self.only.is_empty() || left_out.is_empty() {
             return None;
         }
-        let names: Vec<String> = left_out.iter().map(|g| format!("gpu{} ({})", g.index, g.name)).collect();
-        let (verb, what, them) =
-            if names.len() == 1 { ("is", "a software adapter", "it") } else { ("are", "software adapters", "them") };
+        let names: Vec<String> = left_out.iter().map(|g| format!("gpu{}", g.index)).collect();
+        let (what, them) = if names.len() == 1 { ("a software adapter", "it") } else { ("software adapters", "them") };
         let names = names.join(", ");
-        Some(format!(
-            "Not used: {names} {verb} {what}, slower than the CPU. Use --software-gpus to measure {them} anyway."
-        ))
+        Some(format!("Not used: {names}, {what}. Use --software-gpus to measure {them} anyway."))
     }
 }
 
@@ -107,13 +111,14 @@ mod tests {
         assert_eq!(takes(GpuChoice { software_gpus: true, ..GpuChoice::default() }), (true, true));
         assert_eq!(takes(GpuChoice { no_gpus: true, ..GpuChoice::default() }), (false, false));
         let second = GpuChoice { only: vec![1], ..GpuChoice::default() };
+        assert_eq!((second.words(), GpuChoice::default().words()), (" --gpu 1".to_owned(), String::new()));
         assert_eq!((takes(second.clone()), second.tell(std::slice::from_ref(&real))), ((false, true), None));
         let seen = |identities| Seen { identities, remark: None };
         assert!(second.check(&seen(vec![real.clone(), software.clone()])).is_ok());
         let complaint = second.check(&seen(vec![real.clone()])).unwrap_err().to_string();
         assert_eq!(complaint, "--gpu: this machine has no gpu1, only gpu0 (X)");
         assert!(GpuChoice::default().check(&seen(Vec::new())).is_ok());
-        assert!(GpuChoice::default().tell(&[software]).unwrap().contains("gpu1 (X) is a software adapter"));
+        assert!(GpuChoice::default().tell(&[software]).unwrap().contains("gpu1, a software adapter"));
         assert_eq!(GpuChoice::default().tell(&[]), None);
     }
 

@@ -68,7 +68,7 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
         output::print("Next: run the same command again, which measures those that failed")?;
         return Ok(Outcome::Failed);
     }
-    output::print(&format!("Next: sapwise train {shown} --out model.json"))?;
+    output::print(&shell::next(&format!("train {shown} --out model.json")))?;
     Ok(Outcome::Done)
 }
 

@@ -129,36 +129,50 @@ fn verdict(finding: &Finding, terminal: Terminal) -> String {
 
 /// Which reports can be believed, which are of one kind, and how far repeats agree.
 fn table(files: &[Finding], kinds: &[OfKind], terminal: Terminal) -> String {
-    let mut rows = vec![["report", "kind", "believed", "times over repeats", "quartiles"].map(str::to_owned).to_vec()];
+    let mut rows = vec![["report", "kind", "believed", "× repeats"].map(str::to_owned).to_vec()];
+    let folder = common_folder(kinds.iter().flat_map(|kind| &kind.reports).map(|repeat| &*repeat.file));
     for (k, kind) in kinds.iter().enumerate() {
         for Repeat { file, over_others } in &kind.reports {
             let finding = files.iter().find(|f| f.file == *file);
-            let ratio = over_others.map_or("-".to_owned(), |a| format!("{:.2}", a.median));
-            let quartiles = over_others.map_or("-".to_owned(), |a| {
+            let ratio = over_others.map_or("-".to_owned(), |a| {
                 let [low, high] = a.quartiles;
-                format!("{low:.2} to {high:.2}")
+                format!("{:.2} ({low:.2}–{high:.2})", a.median)
             });
             let believed = finding.map_or_else(String::new, |f| verdict(f, terminal));
-            rows.push(vec![file.clone(), (k + 1).to_string(), believed, ratio, quartiles]);
+            rows.push(vec![file[folder..].to_owned(), (k + 1).to_string(), believed, ratio]);
         }
     }
     let good = files.iter().filter(|f| f.kind.is_some() && f.problems.is_empty() && f.doubts.is_empty()).count();
     let kinds: String =
-        kinds.iter().enumerate().map(|(k, of)| format!("Kind {}: {}\n", k + 1, words(&of.kind))).collect();
-    format!("{}\n{kinds}{good} of {} can be believed.\n", terminal.table(&rows), count(rows.len() - 1, "report"))
+        kinds.iter().enumerate().map(|(k, of)| format!("{:>4}  {}\n", k + 1, words(&of.kind))).collect();
+    let note = "× repeats: times over those of other reports of the kind, median and quartiles.";
+    format!(
+        "{}{note}\n\n{}\n{kinds}{good} of {} can be believed.\n",
+        terminal.table(&rows),
+        terminal.head("kind"),
+        count(rows.len() - 1, "report")
+    )
+}
+
+/// Returns the length of the folder that all paths begin with, its slash included.
+fn common_folder<'a>(mut paths: impl Iterator<Item = &'a str>) -> usize {
+    let Some(first) = paths.next() else { return 0 };
+    let alike = |path: &str| first.bytes().zip(path.bytes()).take_while(|(a, b)| a == b).count();
+    let shared = paths.map(alike).min().unwrap_or(0);
+    first.as_bytes()[..shared].iter().rposition(|&b| b == b'/').map_or(0, |at| at + 1)
 }
 
 fn words(kind: &Kind) -> String {
     let Kind { cpu, cores, simd, host, .. } = kind;
-    let gpus = if kind.gpus.is_empty() { "no GPU".to_owned() } else { kind.gpus.join(", ") };
     let gpu_threads = kind.gpu_threads.map_or(String::new(), |k| format!(" on {}", count(k as usize, "thread")));
-    format!("{cpu}, {}, {simd}, {gpus}{gpu_threads}; host {host}", count(*cores as usize, "core"))
+    let gpus = if kind.gpus.is_empty() { String::new() } else { format!("\n      with {}", kind.gpus.join(", ")) };
+    format!("{cpu}, {}, {simd}, host {host}{gpus}{gpu_threads}", count(*cores as usize, "core"))
 }
 
 /// The next command to try: for the first file with a problem or a doubt, else for the first file or for all reports.
 fn next_step(files: &[Finding], given: &[PathBuf]) -> String {
     let bad = files.iter().find(|f| !f.problems.is_empty() || !f.doubts.is_empty());
-    let Some(file) = bad.or(files.first()) else { return "Next: sapwise predict".to_owned() };
+    let Some(file) = bad.or(files.first()) else { return shell::next("predict") };
     let name = shell::quoted(&file.file);
     let reports = || -> String {
         if files.iter().all(|f| f.kind.is_some()) {
@@ -167,12 +181,12 @@ fn next_step(files: &[Finding], given: &[PathBuf]) -> String {
         files.iter().filter(|f| f.kind.is_some()).map(|f| shell::quoted(&f.file) + " ").collect()
     };
     let next = match (bad.is_some(), file.schema_name()) {
-        (true, Some("model")) => "sapwise predict".to_owned(),
-        (true, Some("tuning")) => "sapwise predict --out tuning.json".to_owned(),
-        (true, _) => "sapwise probe --out report.json".to_owned(),
-        (false, Some("model")) => format!("sapwise predict --model {name}"),
-        (false, Some("tuning")) => format!("sapwise run fragmentation --tuning {name}"),
-        (false, _) => format!("sapwise study {}--out study", reports()),
+        (true, Some("model")) => "predict".to_owned(),
+        (true, Some("tuning")) => "predict --out tuning.json".to_owned(),
+        (true, _) => "probe --out report.json".to_owned(),
+        (false, Some("model")) => format!("predict --model {name}"),
+        (false, Some("tuning")) => format!("run fragmentation --tuning {name}"),
+        (false, _) => format!("study {}--out study", reports()),
     };
-    format!("Next: {next}")
+    shell::next(&next)
 }

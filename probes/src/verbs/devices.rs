@@ -4,9 +4,9 @@ use crate::algorithms::Algorithms;
 use crate::args::Devices;
 use crate::exit::Outcome;
 use crate::gpus::{self, Seen, look};
-use crate::output;
 use crate::progress::Progress;
 use crate::terminal::Terminal;
+use crate::{output, shell};
 use sapwise::AlgorithmId;
 use sapwise::algorithm::{SimdLevel, usable_cores};
 use sapwise_lab::text::count;
@@ -101,18 +101,16 @@ fn text(answer: &Answer, no_gpus: bool, terminal: Terminal) -> String {
     for sentence in &answer.inert {
         text += &format!("\n{}", terminal.warning(&format!("{sentence}.")));
     }
-    text + "\nNext: sapwise predict"
+    text + "\n" + &shell::next(if no_gpus { "predict --no-gpus" } else { "predict" })
 }
 
-/// Draws the GPUs as a table; nothing without any.
+/// Draws the GPUs as a table; nothing without any. Their drivers are in the JSON.
 fn gpu_table(adapters: &[GpuIdentity], terminal: Terminal) -> String {
     if adapters.is_empty() {
         return String::new();
     }
-    let mut rows = vec![["gpu", "kind", "api", "name", "driver"].map(str::to_owned).to_vec()];
-    let row = |g: &GpuIdentity| {
-        vec![format!("gpu{}", g.index), g.kind.to_string(), g.api.clone(), g.name.clone(), g.driver.clone()]
-    };
+    let mut rows = vec![["gpu", "kind", "api", "name"].map(str::to_owned).to_vec()];
+    let row = |g: &GpuIdentity| vec![format!("gpu{}", g.index), g.kind.to_string(), g.api.clone(), g.name.clone()];
     rows.extend(adapters.iter().map(row));
     format!("{}\n", terminal.table(&rows))
 }

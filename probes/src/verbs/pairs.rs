@@ -165,9 +165,9 @@ fn next_step(arguments: &Arguments, frames: usize) -> String {
     let boxes = shell::path(&arguments.boxes);
     let written = arguments.out.as_ref().map(|path| format!("\nWritten to {}.", path.display())).unwrap_or_default();
     let next = match (&arguments.out, frames) {
-        (_, 2..) => format!("sapwise run {boxes}"),
-        (None, _) => format!("sapwise pairs {boxes} --out pairs.npy"),
-        (Some(_), _) => "sapwise devices".to_owned(),
+        (_, 2..) => format!("run {boxes}"),
+        (None, _) => shell::again(&["--out", "pairs.npy"]),
+        (Some(_), _) => "devices".to_owned(),
     };
-    format!("{written}\nNext: {next}")
+    format!("{written}\n{}", shell::next(&next))
 }

@@ -29,26 +29,26 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
     // Until here Ctrl-C ends the program, even when it waits for a pipe.
     interrupt::listen()?;
     let terminal = Terminal::of_standard_output();
-    let mut text = String::new();
     // A sentence on GPUs for people, and their failures for the file.
     let (mut told, mut remarks) = (None, Vec::new());
-    let mut tuning = match &report {
+    let (hardware, mut tuning) = match report {
         Some(report) => {
             if !arguments.measured {
                 let all = report.hardware.gpus.iter().map(|g| g.gpu.clone());
                 told = arguments.gpus.tell(&all.filter(|g| !arguments.gpus.takes(g)).collect::<Vec<_>>());
             }
-            prediction::of_report(report, arguments, &model, algorithms)?
+            let tuning = prediction::of_report(&report, arguments, &model, algorithms)?;
+            (report.hardware, tuning)
         }
         None => {
             let (hardware, measured) = measure_hardware(arguments.threads, &arguments.gpus)?;
-            text = format!("{}\n", summary::hardware(&hardware, terminal));
             remarks = [hardware_doubts(&hardware), hardware.disturbed()].concat();
             interrupt::check()?;
             told = summary::gpus_left_out(&arguments.gpus, &hardware, &measured.left_out, &measured.remarks);
             remarks.extend(measured.remarks);
             let (gpus, slice) = (measured.usable, Slice::of(arguments.scenario.unwrap_or(Scenario::Uniform))?);
-            prediction::predict(&model, &hardware, &gpus, &slice, algorithms)?
+            let tuning = prediction::predict(&model, &hardware, &gpus, &slice, algorithms)?;
+            (hardware, tuning)
         }
     };
     tuning.warnings.append(&mut remarks);
@@ -60,15 +60,18 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
         output::print_file(&json::write_tuning(&tuning)?)?;
         return Ok(outcome);
     }
-    text += &summary::tuning(&tuning, terminal);
-    if let Some(told) = told {
-        text += &format!("\n{told}\n");
-    }
+    let mut text = if arguments.verbose {
+        format!("{}\n{}", summary::hardware(&hardware, terminal), summary::tuning(&tuning, terminal))
+    } else {
+        summary::prediction(&hardware, &tuning, terminal)
+    };
+    text.extend(told.map(|told| format!("{told}\n")));
     text += &match &arguments.out {
         Some(path) => {
-            format!("Written to {}.\nNext: sapwise run fragmentation --tuning {}", path.display(), shell::path(path))
+            let next = format!("run fragmentation --tuning {}{}", shell::path(path), arguments.gpus.words());
+            format!("Written to {}.\n{}", path.display(), shell::next(&next))
         }
-        None => format!("Next: {}", shell::again(&["--out", "tuning.json"])),
+        None => shell::next(&shell::again(&["--out", "tuning.json"])),
     };
     output::print(&text)?;
     Ok(outcome)

@@ -54,7 +54,7 @@ pub(super) fn run(folder: &Path, arguments: &Predict, algorithms: &Algorithms) -
     let written = rows.len() - 1 - without;
     text += &format!("\n{} written to {}.\n", count(written, "tuning"), out.display());
     text += "A program reads the one that Machine::tuning_file names and passes it to Adaptive::new.\n";
-    text += &format!("Next: sapwise check {}", shell::path(folder));
+    text += &shell::next(&format!("check {}", shell::path(folder)));
     output::print(&text)?;
     Ok(if without == 0 { Outcome::Done } else { Outcome::Failed })
 }

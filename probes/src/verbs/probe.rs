@@ -76,7 +76,8 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
     let text = if arguments.json {
         report::write(&report)?
     } else {
-        let next = saved.as_ref().ok().and_then(|path| path.map(|path| summary::next_step(&report, path)));
+        let next =
+            saved.as_ref().ok().and_then(|path| path.map(|path| summary::next_step(&report, path, &arguments.gpus)));
         let told = told.map(|told| format!("\n{told}\n")).unwrap_or_default();
         summary::report(&report, Terminal::of_standard_output()) + &told + &next.unwrap_or_default()
     };

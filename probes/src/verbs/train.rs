@@ -60,13 +60,18 @@ fn name(arguments: &Train) -> anyhow::Result<String> {
     Ok(name)
 }
 
+/// Columns of the table of strategies that fit into 80 characters: the strategy, the regrets, the share over 10 %.
+const SHOWN: [usize; 4] = [0, 1, 2, 8];
+
 /// What the columns of the summary mean.
-const COLUMNS: &str = "Regret is time over the best time, less one; in parentheses weighted by how often games are \
-                       assumed to have that many objects (log-normal\naround 800). Crossovers off by: median distance \
-                       between measured and predicted crossovers. --card explains every column.\n";
+const COLUMNS: &str = "Regret is time over the best time, less one; in parentheses weighted for games,\n\
+assumed to have around 800 objects. --card writes and explains all columns.\n";
 
 fn summary(model: &Model, training: &Training, notes: &[String], path: &Path, terminal: Terminal) -> String {
-    let table = |rows: &[Vec<String>]| terminal.table(rows);
+    let table = |rows: &[Vec<String>]| {
+        let kept = |row: &Vec<String>| SHOWN.into_iter().filter_map(|k| row.get(k).cloned()).collect();
+        terminal.table(&rows.iter().map(kept).collect::<Vec<_>>())
+    };
     let mut text = model_card::scores(&training.validation, table);
     if !training.validation.methods.is_empty() {
         text.push_str(&format!("\n{COLUMNS}"));
@@ -75,9 +80,9 @@ fn summary(model: &Model, training: &Training, notes: &[String], path: &Path, te
         text.push_str(&format!("{} {note}\n", terminal.warning("note:")));
     }
     text + &format!(
-        "\nThe model, named {:?}, is in {}.\nNext: sapwise predict --model {}",
+        "\nThe model, named {:?}, is in {}.\n{}",
         model.name,
         path.display(),
-        shell::path(path)
+        shell::next(&format!("predict --model {}", shell::path(path)))
     )
 }

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// The command, with no SIMD level from the environment of the tests.
 pub(crate) fn sapwise() -> Command {
     let mut command = Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
-    command.env_remove("SAPWISE_SIMD");
+    command.env_remove("SAPWISE_SIMD").env_remove("CARGO");
     command
 }
 

@@ -91,7 +91,15 @@ impl Answer<'_> {
         let (frames, repeats) = (count(outcome.frames.len(), "frame"), count(outcome.repeats, "repeat"));
         let name = self.settings.source.name();
         let head = format!("{name}, {frames} of {objects}, medians of {repeats}, same pairs from all");
-        let mut lines = vec![terminal.head(&head), format!("{}\n", self.tuning()), self.totals(terminal)];
+        let conclusion = match (self.whole.over_best_fixed, self.best_fixed()) {
+            (Some(ratio), Some(id)) => format!("{ratio:.3} × the time of {id}, the best single algorithm."),
+            _ => format!(
+                "{:.3} × the time of the oracle; no single algorithm ran in all frames.",
+                self.whole.over_windows
+            ),
+        };
+        let mut lines = vec![terminal.head(&format!("Adaptive takes {conclusion}")), head];
+        lines.extend([format!("{}\n", self.tuning()), self.totals(terminal)]);
         for (k, id) in outcome.fixed.iter().enumerate() {
             let missed = outcome.fixed_times(k).err().map(|missed| count(missed, "frame"));
             lines.extend(
@@ -99,13 +107,10 @@ impl Answer<'_> {
             );
         }
         lines.push(self.comparison(terminal));
-        if let (Some(ratio), Some(id)) = (self.whole.over_best_fixed, self.best_fixed()) {
-            lines.push(format!("Adaptive takes {ratio:.3} × the time of {id}, the best single algorithm."));
-        }
         lines.push(format!(
-            "The oracle runs the best algorithm of every {WINDOW} frames. {}",
+            "The oracle runs the best algorithm of every {WINDOW} frames.\n{}",
             match outcome.repeats {
-                1 => "With one repeat it chooses and is timed on the same frames, which noise favours.",
+                1 => "With one repeat it chooses and is timed on the same frames: noise favours it.",
                 _ => "It chooses on one half of the repeats and is timed on the other.",
             }
         ));
@@ -116,7 +121,7 @@ impl Answer<'_> {
         }
         let written = [("Recorded", &arguments.record), ("Traced", &arguments.trace), ("Drawn", &arguments.plot)];
         lines.extend(written.into_iter().filter_map(|(verb, p)| Some(format!("{verb} in {}.", p.as_ref()?.display()))));
-        lines.push(format!("Next: {}", next_step(arguments, self.origin)));
+        lines.push(shell::next(&next_step(arguments, self.origin)));
         lines.join("\n")
     }
 
@@ -132,7 +137,7 @@ impl Answer<'_> {
             let times = [t.total_ms, t.median_ms, t.p99_ms, t.worst_ms].map(|ms| duration(ms * 1e6));
             [&[name.to_owned()], &times[..], &[ran]].concat()
         };
-        let head = ["run by", "total", "median", "p99", "worst frame", "adaptive ran it in"];
+        let head = ["run by", "total", "median", "p99", "worst", "chosen in"];
         let mut rows = vec![head.map(str::to_owned).to_vec()];
         rows.push(row("oracle of windows", &self.whole.windows, String::new()));
         rows.push(row("adaptive", &self.whole.adaptive, String::new()));
@@ -154,7 +159,7 @@ impl Answer<'_> {
             let counts = [p.switches, p.explored].map(|n| n.to_string());
             [&[frames, single, format!("{:.3}", p.over_windows)][..], &times, &counts].concat()
         };
-        let head = ["frames", "× single", "× oracle", "median", "p99", "worst frame", "switches", "explored"];
+        let head = ["frames", "× single", "× oracle", "median", "p99", "worst", "switches", "explored"];
         let mut rows = vec![head.map(str::to_owned).to_vec(), row("all".to_owned(), &self.whole)];
         rows.extend(self.parts.iter().map(|p| row(format!("{} to {}", p.from_frame, p.to_frame), p)));
         format!("\n{}", terminal.table(&rows))
@@ -182,8 +187,8 @@ fn next_step(arguments: &Run, origin: &Origin) -> String {
     };
     match (origin.from, &arguments.plot) {
         (_, None) => shell::again(&["--plot", "run.svg"]),
-        (OriginKind::Prediction, _) => "sapwise probe --out report.json".to_owned(),
-        (_, Some(_)) => format!("sapwise run {scene}"),
+        (OriginKind::Prediction, _) => format!("probe --out report.json{}", arguments.gpus.words()),
+        (_, Some(_)) => format!("run {scene}"),
     }
 }
 
