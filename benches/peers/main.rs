@@ -2,7 +2,7 @@
 //!
 //! ```sh
 //! cargo bench -p sapwise-bench --bench peers
-//! SAPWISE_RESULTS=results cargo bench -p sapwise-bench --bench peers   # writes peers.csv and peers.md into the folder
+//! SAPWISE_RESULTS=results cargo bench -p sapwise-bench --bench peers   # writes peers.csv into the folder
 //! ```
 //!
 //! | variable | meaning |
@@ -13,7 +13,7 @@
 //! | `SAPWISE_CONTESTANTS` | who takes part: `adaptive,bvh,parry3d refit`; `bvh` is `bvh@cpu1` and `bvh@cpu2` |
 //! | `SAPWISE_BENCH_SECONDS` | time for the timed frames of a scenario at a size `[default: 6]` |
 //! | `SAPWISE_TAIL_SECONDS` | time for the slowest frames of a scenario at a size, 0 for none `[default: 30]` |
-//! | `SAPWISE_RESULTS` | folder for `peers.csv` and `peers.md`; without it the ratios are printed |
+//! | `SAPWISE_RESULTS` | folder for `peers.csv`; without it the ratios are printed |
 //!
 //! Method and bias stand at the head of `BENCHMARKS.md`. Prints a line for each scenario and size as soon as it is
 //! measured. Criterion times its candidates one after the other, which is why it is not used here. Without `--bench`,
@@ -125,8 +125,7 @@ fn bench() -> Result<(), String> {
             let path = folder.join(name);
             std::fs::write(&path, text).map_err(|e| format!("{}: {e}", path.display()))
         };
-        put("peers.csv", table::csv(compared))?;
-        put("peers.md", table::summary(compared))
+        put("peers.csv", table::csv(compared))
     };
     let mut compared = Vec::new();
     for &threads in &settings.threads {

@@ -96,10 +96,12 @@ fn by_scenario(points: &[Point], cell: impl Fn(&Point) -> Option<String>) -> Str
     grid("scenario", &sizes, &scenarios.into_iter().map(row).collect::<Vec<_>>())
 }
 
-/// All times of all points in milliseconds: one row for each contestant. Without slowest frames the last columns are
-/// empty.
+/// All times of all points in milliseconds: one row for each contestant. Without slowest frames the `tail_` columns are
+/// empty. Only the row of `adaptive` has the last column: the time of the fastest peer over its own, frame by frame,
+/// median.
 pub(crate) fn csv(results: &[(u32, Vec<Point>)]) -> String {
-    let mut text = "threads,scenario,objects,contestant,median_ms,quartile_1_ms,quartile_3_ms,frames,tail_p50_ms,tail_p99_ms,tail_worst_ms,tail_frames,tail_runs\n"
+    let mut text = "threads,scenario,objects,contestant,median_ms,quartile_1_ms,quartile_3_ms,frames,\
+        tail_p50_ms,tail_p99_ms,tail_worst_ms,tail_frames,tail_runs,peer_over_adaptive\n"
         .to_owned();
     for (threads, points) in results {
         for point in points {
@@ -110,10 +112,12 @@ pub(crate) fn csv(results: &[(u32, Vec<Point>)]) -> String {
                 let _ = match &lane.tail {
                     Some(tail) => {
                         let [p50, p99, worst] = tail.quantiles().map(|s| digits(s * 1e3));
-                        writeln!(text, "{p50},{p99},{worst},{},{}", tail.seconds.len(), tail.runs)
+                        write!(text, "{p50},{p99},{worst},{},{}", tail.seconds.len(), tail.runs)
                     }
-                    None => writeln!(text, ",,,,"),
+                    None => write!(text, ",,,,"),
                 };
+                let gain = point.gain().filter(|_| lane.name == "adaptive").map(|[_, median, _]| digits(median));
+                let _ = writeln!(text, ",{}", gain.unwrap_or_default());
             }
         }
     }

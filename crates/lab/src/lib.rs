@@ -55,5 +55,5 @@ pub use training::{
 
 /// The example of the guide for researchers as a test.
 #[cfg(doctest)]
-#[doc = include_str!("../../../docs/research.md")]
+#[doc = include_str!("../../../docs/measuring.md")]
 struct Research;

@@ -10,7 +10,7 @@ const DOCUMENTS: [(&str, &str); 10] = [
     ("docs/fleet.md", include_str!("../../../docs/fleet.md")),
     ("docs/guide.md", include_str!("../../../docs/guide.md")),
     ("docs/python.md", include_str!("../../../docs/python.md")),
-    ("docs/research.md", include_str!("../../../docs/research.md")),
+    ("docs/measuring.md", include_str!("../../../docs/measuring.md")),
     ("docs/methodology.md", include_str!("../../../docs/methodology.md")),
     ("docs/limitations.md", include_str!("../../../docs/limitations.md")),
     ("BENCHMARKS.md", include_str!("../../../BENCHMARKS.md")),

@@ -5,7 +5,6 @@ use sapwise::algorithm::Load;
 use sapwise::tuning::Term;
 use sapwise_tune::Hardware;
 use sapwise_tune::model::Scale;
-use sapwise_tune::stats::median;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,0 +1,468 @@
+#!/usr/bin/env python3
+"""Renders results/*.csv into results/*.md and splices tables and sentences from them into the documents.
+
+    tools/results.py            # writes
+    tools/results.py --check    # compares; for CI
+
+A document has blocks between `<!--NAME-->` and `<!--/NAME-->`; a number of a measurement stands nowhere else. Captions
+come from results/provenance.csv. `tools/results.sh` measures. Needs Python 3.8 only.
+"""
+
+import bars
+import csv
+import json
+import math
+import pathlib
+import re
+import statistics
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+RESULTS = ROOT / "results"
+H200 = "NVIDIA H200"
+
+
+def rows(name):
+    with open(RESULTS / name, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def digits(value, count=3):
+    """Three significant digits, thousands apart."""
+    value = float(value)
+    if value >= 10**count:
+        return f"{value:,.0f}".replace(",", " ")
+    whole = math.floor(math.log10(abs(value))) + 1 if value else 1
+    return f"{value:.{min(max(count - whole, 0), 3)}f}"
+
+
+def size(objects):
+    objects = int(objects)
+    return f"{objects:,}".replace(",", " ") if objects >= 10_000 else str(objects)
+
+
+def geometric_mean(values):
+    return math.exp(statistics.mean(map(math.log, values)))
+
+
+def table(head, body):
+    lines = [head, ["---"] * len(head), *body]
+    return (
+        "".join("| " + " | ".join(map(str, line)) + " |\n" for line in lines)
+        .replace("| --- ", "|---")
+        .replace("|--- |", "|---|")
+    )
+
+
+def caption(name, link=""):
+    """Machine, date, commit, number of samples and command of a file."""
+    known = next(row for row in rows("provenance.csv") if row["file"] == name)
+    file = f"[{name}]({link}results/{name})" if link is not None else f"[{name}]({name})"
+    command = f"`{known['command']}`; " if known["command"] else ""
+    return f"{known['machine']}; {known['date']}; commit {known['commit']}; {known['samples']}; {command}{file}."
+
+
+def short_caption(name, page):
+    known = next(row for row in rows("provenance.csv") if row["file"] == name)
+    return f"{known['machine']}; {known['date']} ([commit, samples, command](results/{page}))."
+
+
+# --- Peers
+
+
+def peers():
+    """Each cell on one thread: rows by contestant, and the ratio to the fastest peer."""
+    cells = {}
+    for row in rows("peers.csv"):
+        if row["threads"] == "1":
+            cell = cells.setdefault((row["scenario"], int(row["objects"])), {"ratio": None})
+            cell[row["contestant"]] = row
+            if row["peer_over_adaptive"]:
+                cell["ratio"] = float(row["peer_over_adaptive"])
+    return cells
+
+
+def least(cell, family):
+    times = [float(row["median_ms"]) for name, row in cell.items() if name != "ratio" and name.startswith(family)]
+    return digits(min(times)) if times else "-"
+
+
+SCENES = ("uniform", "fast", "clustered", "tower")
+
+
+def readme_peers():
+    cells = peers()
+    body = []
+    for scenario in SCENES:
+        cell = cells[scenario, 10_000]
+        times = [least(cell, family) for family in ("adaptive", "parry3d", "obvhs", "rstar")]
+        body.append([f"`{scenario}`", *times, digits(cell["ratio"], 2)])
+    text = table(["scene", "Sapwise", "parry3d", "obvhs", "rstar", "× fastest peer"], body)
+    many = [cell["ratio"] for (_, n), cell in cells.items() if n >= 1000 and cell["ratio"]]
+    few = [cell["ratio"] for (_, n), cell in cells.items() if n == 100 and cell["ratio"]]
+    ahead = [sum(ratio > 1 for ratio in ratios) for ratios in (many, few)]
+    return text + (
+        f"\nFrom 1000 boxes on, it is {geometric_mean(many):.1f}× as fast as the fastest peer (geometric mean) "
+        f"and ahead in {ahead[0]} of {len(many)} cells. "
+        f"At 100 boxes it is {geometric_mean(few):.1f}× as fast and ahead in {ahead[1]} of {len(few)}.\n"
+    )
+
+
+def picture_of_peers():
+    cells = peers()
+    families = {"Sapwise": "adaptive", "parry3d": "parry3d", "obvhs": "obvhs", "rstar": "rstar"}
+    groups = {
+        scenario: {name: least(cells[scenario, 10_000], family) for name, family in families.items()}
+        for scenario in SCENES
+    }
+    return bars.picture("Milliseconds a frame, 10 000 boxes, one thread; the best mode of each crate", groups)
+
+
+def page_of_peers():
+    cells = peers()
+    sizes = [100, 1000, 10_000, 100_000]
+    body = []
+    for scenario in dict.fromkeys(scenario for scenario, _ in cells):
+        ratios = [cells.get((scenario, n), {}).get("ratio") for n in sizes]
+        kept = cells.get((scenario, 10_000), {}).get("pair-cache@cpu1", {})
+        p50, p99 = kept.get("tail_p50_ms"), kept.get("tail_p99_ms")
+        body.append(
+            [scenario, *(digits(r) if r else "-" for r in ratios), digits(float(p99) / float(p50)) if p99 else "-"]
+        )
+    return (
+        "# Beside peers\n\nTime of the fastest peer over that of `adaptive`, one thread, by number of boxes; "
+        "median over the frames. "
+        "Last: p99 over median of `pair-cache` at 10 000.\n\n"
+        + table(["scenario", *map(size, sizes), "p99"], body)
+        + "\n"
+        + caption("peers.csv", None)
+        + "\n"
+    )
+
+
+# --- GPUs
+
+
+def gpu_times():
+    """Medians of today's card by objects, algorithm and memory."""
+    return {
+        (int(r["objects"]), r["algorithm"], r["memory"]): float(r["median_ms"])
+        for r in rows("gpu.csv")
+        if r["card"] == H200
+    }
+
+
+GPU_COLUMNS = [
+    ("grid-sap@cpu16", "host"),
+    ("grid-sap@gpu0", "host"),
+    ("grid-sap@gpu0", "device"),
+    ("bvh@gpu0", "device"),
+]
+
+
+def gpu_table():
+    times = gpu_times()
+    sizes = sorted({n for n, _, _ in times})
+    body = [
+        [size(n), *(digits(times[(n, *column)]) if (n, *column) in times else "-" for column in GPU_COLUMNS)]
+        for n in sizes
+    ]
+    head = ["objects", "`grid-sap`, 16 cores", "GPU, from host", "GPU, resident", "`bvh` on the GPU, resident"]
+    over = [[times[(n, *GPU_COLUMNS[0])] / times[(n, *GPU_COLUMNS[k])] for n in sizes if n >= 100_000] for k in (1, 2)]
+    speed = [f"{digits(min(o), 2)} to {digits(max(o), 2)}×" for o in over]
+    return (
+        table(head, body)
+        + f"\nFrom 100 000 objects on, the GPU is {speed[0]} as fast from host memory; resident, {speed[1]}.\n\n"
+        + caption("gpu.csv")
+        + "\n"
+    )
+
+
+def gpu_sentence():
+    times = gpu_times()
+    million = [digits(times[(1_000_000, *column)], 2) for column in GPU_COLUMNS[:3]]
+    return (
+        f"A million boxes of `uniform` take `grid-sap` {million[0]} ms on 16 cores, {million[1]} ms on an H200, "
+        f"and {million[2]} ms there "
+        "[without transfers](BENCHMARKS.md#on-a-gpu).\n"
+    )
+
+
+PARTS = {
+    "search (`count`)": ["count"],
+    "pairs (`positions`, `write`)": ["positions", "write"],
+    "copies and clears": ["copies before, clears", "copies after"],
+    "recording and submitting": ["CPU: recording", "CPU: submitting"],
+    "resident frame without timestamps": ["wall without timestamps"],
+}
+# Sums, and waits that overlap with the GPU.
+NO_PARTS = ["GPU", "wall", "CPU: preparing", "CPU: waiting", "CPU: the rest"]
+
+
+def gpu_dispatches():
+    times = {}
+    for row in rows("gpu-dispatches.csv"):
+        if row["method"] == "grid-sap":
+            times.setdefault((int(row["objects"]), row["memory"]), {})[row["part"]] = float(row["us"])
+    sizes = sorted({n for n, _ in times})
+    named = [part for parts in PARTS.values() for part in parts]
+    keys = [sum(us for part, us in times[n, "device"].items() if part not in named + NO_PARTS) for n in sizes]
+    body = [["keys and sort", *(size(round(us)) for us in keys)]]
+    body += [
+        [label, *(size(round(sum(times[n, "device"][part] for part in parts))) for n in sizes)]
+        for label, parts in PARTS.items()
+    ]
+    body.append(
+        [
+            "from host memory, without timestamps",
+            *(size(round(times[n, "host"]["wall without timestamps"])) for n in sizes),
+        ]
+    )
+    return table(["part, µs", *map(size, sizes)], body) + "\n" + caption("gpu-dispatches.csv", "../") + "\n"
+
+
+def gpu_peers():
+    names = {
+        "grid-sap@gpu0": "`grid-sap`",
+        "bvh@gpu0": "`bvh`",
+        "kitten-pool": "KittenGpuLBVH",
+        "cubql": "cuBQL",
+        "cupy-grid": "grid in CuPy",
+    }
+    times = {(int(r["objects"]), r["contestant"]): r["median_ms"] for r in rows("gpu-peers.csv")}
+    sizes = sorted({n for n, _ in times})
+    body = [[size(n), *(digits(times[n, name]) if (n, name) in times else "-" for name in names)] for n in sizes]
+    ours = {n: float(times[n, "grid-sap@gpu0"]) for n in sizes}
+    over = [min(float(times[n, name]) for name in names if "gpu0" not in name) / ours[n] for n in sizes]
+    sentence = (
+        f"The fastest of the others takes {digits(min(over), 2)} to {digits(max(over), 2)}× the time of `grid-sap`.\n"
+    )
+    return table(["boxes", *names.values()], body) + "\n" + sentence + "\n" + caption("gpu-peers.csv", "../") + "\n"
+
+
+def page_of_gpu():
+    return "# On a GPU\n\nMedian ms of a frame of `uniform`.\n\n" + gpu_table().replace("(results/", "(")
+
+
+# --- Running programs
+
+
+def inline_table():
+    groups = {}
+    for row in rows("inline.csv"):
+        groups.setdefault((row["host"], row["tuning"]), []).append(row)
+    body = []
+    for (host, tuning), runs in groups.items():
+        single, oracle = ([float(r[key]) for r in runs] for key in ("over_single", "over_windows"))
+        worst = max(runs, key=lambda r: float(r["over_single"]))
+        body.append(
+            [
+                host,
+                tuning,
+                len(runs),
+                f"{geometric_mean(single):.3f}",
+                f"{float(worst['over_single']):.2f} (`{worst['scene']}`)",
+                f"{geometric_mean(oracle):.3f}",
+            ]
+        )
+    return table(["host", "tuning", "runs", "× single", "worst", "× oracle"], body)
+
+
+def inline_sentence():
+    single = [float(r["over_single"]) for r in rows("inline.csv") if r["tuning"] == "predicted"]
+    return (
+        f"- A running program takes {geometric_mean(single):.2f}× the time of the best single algorithm, "
+        "known only in hindsight "
+        f"(geometric mean of {len(single)} runs, [details](docs/methodology.md#in-a-running-program)).\n"
+    )
+
+
+def page_of_inline():
+    return "# In a running program\n\n" + inline_table() + "\n" + caption("inline.csv", None) + "\n"
+
+
+# --- Machines held out
+
+
+def strategies():
+    """The table of strategies: those of earlier models as they are stored, and those of the built-in model."""
+    model = json.loads((ROOT / "models/default.json").read_text(encoding="utf-8"))
+    validation = model["training"]["validation"]
+    kept = [row for row in rows("strategies.csv") if row["model"] != model["name"]]
+    percent = lambda value: "" if value is None else f"{100 * value:.1f}"
+    for method in validation["methods"]:
+        unseen = (method.get("unseen_scenario") or {}).get("all") or {}
+        kept.append(
+            {
+                "model": model["name"],
+                "commit": "this one",
+                "hosts": str(validation["physical_machines"]),
+                "strategy": method["name"],
+                "unseen_percent": percent(unseen.get("all")),
+                "unseen_games_percent": percent(unseen.get("in_games")),
+                "seen_percent": percent(method["mean_regret"]),
+                "seen_games_percent": percent(method["mean_regret_in_games"]),
+            }
+        )
+    return kept, model["name"]
+
+
+SHOWN = {
+    "single best": "one fixed algorithm",
+    "nearest machine": "most similar machine",
+    "physics + load": "Sapwise's prediction",
+}
+
+
+def readme_strategies():
+    kept, name = strategies()
+    own = {row["strategy"]: row for row in kept if row["model"] == name}
+    body = [
+        [words, *(f"{own[s][key]} %" for key in ("unseen_percent", "unseen_games_percent"))]
+        for s, words in SHOWN.items()
+    ]
+    hosts = next(iter(own.values()))["hosts"]
+    return (
+        f"Time lost against the best choice, each of {hosts} machines held out in turn, and the scene too "
+        "([all strategies](results/heldout.md)):\n\n" + table(["strategy", "all sizes", "around 800 boxes"], body)
+    )
+
+
+def blind_table():
+    body = []
+    for row in rows("heldout.csv"):
+        if not re.fullmatch(r"\d+t.*|avx2.*|portable.*", row["profile"]):
+            body.append(
+                [
+                    row["host"],
+                    row["profile"],
+                    row["model_trained_on"],
+                    f"{row['regret_all_percent']} ({row['regret_games_percent']})",
+                ]
+            )
+    return table(["host", "profile", "model trained on", "regret, %"], body)
+
+
+def page_of_heldout():
+    kept, _ = strategies()
+    dash = lambda value: value or "-"
+    body = []
+    for model in dict.fromkeys(row["model"] for row in kept):
+        of_model = [row for row in kept if row["model"] == model]
+        for row in of_model:
+            if row["unseen_percent"]:
+                body.append(
+                    [
+                        model,
+                        row["strategy"],
+                        *(dash(row[k]) for k in ("unseen_percent", "unseen_games_percent", "seen_percent")),
+                    ]
+                )
+    threads = [r for r in rows("heldout.csv") if re.fullmatch(r"\d+t.*|avx2.*|portable.*", r["profile"])]
+    own = [[r["host"], r["profile"], r["model_trained_on"], r["regret_all_percent"]] for r in threads]
+    return (
+        "# Machines held out\n\nRegret in percent: time of the choice over that of the best, less one. "
+        "*In games*: weighted around 800 boxes. "
+        "The model of six hosts is of commit 22f9246, whose algorithms are older.\n\n"
+        + table(["model", "strategy", "unseen scenario", "in games", "seen scenario"], body)
+        + "\nHosts measured after the model was committed, by profile:\n\n"
+        + table(["host", "profile", "model trained on", "regret"], own)
+        + "\n"
+        + caption("heldout.csv", None)
+        + "\n"
+    )
+
+
+# --- Python and other bindings
+
+
+def python_sentence():
+    times = {row["contestant"]: row["median_ms"] for row in rows("python.csv") if row["objects"] == "10000"}
+    named = ", ".join(f"{name} {time} ms" for name, time in times.items())
+    return f"For frames of 10 000 `uniform` boxes, medians: {named}. {caption('python.csv', '../')}\n"
+
+
+def small_pages():
+    """A table of each small file that was measured."""
+    for name in ("sizes", "builds", "memory", "c", "avian", "web"):
+        if (RESULTS / f"{name}.csv").exists():
+            body = rows(f"{name}.csv")
+            yield (
+                f"{name}.md",
+                f"# {name.capitalize()}\n\n{table(list(body[0]), [row.values() for row in body])}\n"
+                f"{caption(f'{name}.csv', None)}\n",
+            )
+
+
+def sample():
+    return "```text\n" + (RESULTS / "predict.txt").read_text(encoding="utf-8") + "```\n"
+
+
+def spliced():
+    """The blocks of each document."""
+    blocks = {
+        "README.md": {
+            "peers": readme_peers() + "\n" + short_caption("peers.csv", "peers.md") + "\n",
+            "gpu": gpu_sentence(),
+            "strategies": readme_strategies(),
+            "predict": sample(),
+            "inline": inline_sentence(),
+        },
+        "BENCHMARKS.md": {"gpu": gpu_table()},
+        "docs/gpu.md": {"gpu-dispatches": gpu_dispatches(), "gpu-peers": gpu_peers()},
+        "docs/methodology.md": {
+            "inline": inline_table() + "\n" + caption("inline.csv", "../") + "\n",
+            "blind": blind_table() + "\n" + caption("heldout.csv", "../") + "\n",
+        },
+        "docs/python.md": {"python": python_sentence()},
+    }
+    return blocks
+
+
+def pages():
+    return {
+        "peers.md": page_of_peers(),
+        "gpu.md": page_of_gpu(),
+        "inline.md": page_of_inline(),
+        "heldout.md": page_of_heldout(),
+        **dict(small_pages()),
+    }
+
+
+def with_blocks(name, text, blocks):
+    for block, content in blocks.items():
+        pattern = re.compile(rf"(<!--{block}-->\n).*?(<!--/{block}-->)", re.S)
+        text, count = pattern.subn(lambda m: m[1] + content + m[2], text)
+        assert count == 1, f"{name} has {count} blocks {block}"
+    return text
+
+
+def written():
+    """Every generated text by its path."""
+    texts = {RESULTS / name: text for name, text in pages().items()}
+    texts[ROOT / "pictures/peers.svg"] = picture_of_peers()
+    for name, blocks in spliced().items():
+        texts[ROOT / name] = with_blocks(name, (ROOT / name).read_text(encoding="utf-8"), blocks)
+    kept, _ = strategies()
+    lines = [",".join(kept[0])] + [",".join(row.values()) for row in kept]
+    texts[RESULTS / "strategies.csv"] = "\n".join(lines) + "\n"
+    return texts
+
+
+def check():
+    stale = [path for path, text in written().items() if not path.exists() or path.read_text(encoding="utf-8") != text]
+    for path in stale:
+        print(f"{path.relative_to(ROOT)} differs from results/*.csv", file=sys.stderr)
+    if stale:
+        sys.exit("`tools/results.py` writes results/*.md and the blocks of the documents anew")
+
+
+def main():
+    if sys.argv[1:] == ["--check"]:
+        check()
+    else:
+        for path, text in written().items():
+            path.write_text(text, encoding="utf-8")
+
+
+main()
