@@ -8,14 +8,15 @@ A document has blocks between `<!--NAME-->` and `<!--/NAME-->`; a number of a me
 come from results/provenance.csv. `tools/results.sh` measures. Needs Python 3.8 only.
 """
 
-import bars
 import csv
 import json
-import math
 import pathlib
 import re
-import statistics
 import sys
+
+sys.dont_write_bytecode = True
+import bars  # noqa: E402
+from cells import digits, geometric_mean, size, table  # noqa: E402
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "results"
@@ -25,33 +26,6 @@ H200 = "NVIDIA H200"
 def rows(name):
     with open(RESULTS / name, newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
-
-
-def digits(value, count=3):
-    """Three significant digits, thousands apart."""
-    value = float(value)
-    if value >= 10**count:
-        return f"{value:,.0f}".replace(",", " ")
-    whole = math.floor(math.log10(abs(value))) + 1 if value else 1
-    return f"{value:.{min(max(count - whole, 0), 3)}f}"
-
-
-def size(objects):
-    objects = int(objects)
-    return f"{objects:,}".replace(",", " ") if objects >= 10_000 else str(objects)
-
-
-def geometric_mean(values):
-    return math.exp(statistics.mean(map(math.log, values)))
-
-
-def table(head, body):
-    lines = [head, ["---"] * len(head), *body]
-    return (
-        "".join("| " + " | ".join(map(str, line)) + " |\n" for line in lines)
-        .replace("| --- ", "|---")
-        .replace("|--- |", "|---|")
-    )
 
 
 def caption(name, link=""):
