@@ -38,6 +38,17 @@ const SLICE: std::ops::RangeInclusive<u32> = 4..=24;
 /// Every algorithm takes the same boxes and returns the same pairs, so a switch is invisible but for its speed. What
 /// is expected comes from [`Tuning`] and, where these have cost curves, from the times of the frames that were run:
 /// [`set_learning`](Self::set_learning).
+///
+/// ```
+/// use sapwise::{Aabb, Adaptive, BroadPhase, Pairs, Registry, Tuning};
+///
+/// let registry = Registry::new();
+/// let mut adaptive = Adaptive::new(Tuning::usual(&registry), &registry)?;
+/// let mut pairs = Pairs::new();
+/// adaptive.find_pairs(&[Aabb::cube([0.0; 3], 1.0); 2], &mut pairs)?; // every frame
+/// assert_eq!(pairs.as_slice(), [(0, 1)]);
+/// # Ok::<(), sapwise::Error>(())
+/// ```
 pub struct Adaptive {
     runner: Runner,
     /// How it came to its tuning.

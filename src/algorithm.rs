@@ -13,6 +13,12 @@ use std::str::FromStr;
 /// A method and its backend, written `method@backend`: `brute@cpu1`, `grid-sap@cpu8`, `sap@gpu0`, `grid-sap@gpu0+1`.
 ///
 /// JSON, the command line and logs use this text.
+///
+/// ```
+/// let id: sapwise::AlgorithmId = "grid-sap@cpu8".parse()?;
+/// assert_eq!((id.method(), id.threads()), ("grid-sap", 8));
+/// # Ok::<(), sapwise::error::ParseIdError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct AlgorithmId {
     method: String,
@@ -20,6 +26,13 @@ pub struct AlgorithmId {
 }
 
 /// The processor of an algorithm.
+///
+/// ```
+/// use sapwise::algorithm::Backend;
+///
+/// assert_eq!("gpu0+1".parse(), Ok(Backend::Gpu(vec![0, 1])));
+/// assert_eq!(Backend::Cpu(4).to_string(), "cpu4");
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Backend {

@@ -13,6 +13,31 @@ use crate::pairs::Pairs;
 /// Implementations keep their buffers between calls, and allocate nothing after a frame as large and as dense. Two
 /// exceptions: with several threads rayon allocates small jobs, and `pair-cache` takes some frames more, until its
 /// margin has settled.
+///
+/// ```
+/// use sapwise::{Aabb, BroadPhase, Error, Pairs};
+///
+/// /// Compares every box with every later one.
+/// struct All;
+///
+/// impl BroadPhase for All {
+///     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+///         pairs.clear();
+///         for (b, second) in (0..).zip(boxes) {
+///             for (a, first) in (0..b).zip(boxes) {
+///                 if first.overlaps(second) {
+///                     pairs.push(a, b);
+///                 }
+///             }
+///         }
+///         pairs.finish()
+///     }
+/// }
+/// let mut pairs = Pairs::new();
+/// All.find_pairs(&[Aabb::cube([0.0; 3], 1.0); 2], &mut pairs)?;
+/// assert_eq!(pairs.as_slice(), [(0, 1)]);
+/// # Ok::<(), sapwise::Error>(())
+/// ```
 pub trait BroadPhase: Send + Sync {
     /// Replaces the content of `pairs` with the overlapping pairs of `boxes`.
     ///
@@ -86,6 +111,13 @@ pub enum FrameKind {
 }
 
 /// The work of a frame of an incremental algorithm.
+///
+/// ```
+/// use sapwise::algorithm::{FrameKind, FrameWork};
+///
+/// let rebuilt = FrameWork::new(FrameKind::Rebuilt, 3.0); // three times the usual work
+/// assert_eq!(rebuilt.over_mean, 3.0);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct FrameWork {

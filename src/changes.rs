@@ -16,6 +16,18 @@ use crate::pairs::{Pairs, Sorter};
 /// AMD EPYC this takes 10 to 20 ns a pair with 1000 to 100 000 pairs, or a third of that if the pairs have canonical
 /// order and ids ascend with positions. When ids have changed, the update sorts them too. Memory for each pair: 12
 /// bytes and two pairs of ids, and another pair if it began or ended. Memory for each box: 8 bytes and two ids.
+///
+/// ```
+/// use sapwise::{Changes, Pairs};
+///
+/// let mut pairs = Pairs::new();
+/// pairs.push(0, 1);
+/// pairs.finish()?;
+/// let mut changes = Changes::new();
+/// changes.update(&pairs, &["wall", "player"])?;
+/// assert_eq!(changes.begun(), [("player", "wall")]);
+/// # Ok::<(), sapwise::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Changes<Id = u32> {
     /// The ids of the last update.

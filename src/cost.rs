@@ -23,6 +23,14 @@ pub use term::{Product, Term};
 pub const MOST_UNIT_NS: f64 = 3.6e12;
 
 /// The cost of one algorithm on one machine as a function of the load.
+///
+/// ```
+/// use sapwise::algorithm::Load;
+/// use sapwise::tuning::{CostCurve, CostTerm, Term};
+///
+/// let curve = CostCurve::new(vec![CostTerm::new(Term::Call, 100.0), CostTerm::new(Term::Objects, 5.0)]);
+/// assert_eq!(curve.cost_ns(&Load::of_objects(20)), 200.0);
+/// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub struct CostCurve {

@@ -4,6 +4,13 @@ use crate::algorithm::AlgorithmId;
 use crate::error::Unavailable;
 
 /// An algorithm in a registry.
+///
+/// ```
+/// let registry = sapwise::Registry::with_cores(2);
+/// let brute = &registry.entries()[0];
+/// assert_eq!(brute.id.to_string(), "brute@cpu1");
+/// assert!(brute.unavailable.is_none());
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Entry {

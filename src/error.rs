@@ -15,6 +15,17 @@ pub use gpu::{GpuError, GpuErrorKind};
 
 described! {
     /// Why a broad phase returned no answer. The content of the pairs is unspecified after an error.
+    ///
+    /// ```
+    /// use sapwise::error::BoxDefect;
+    /// use sapwise::{Aabb, BroadPhase, Error, Pairs, Registry};
+    ///
+    /// let mut brute = Registry::new().create(&"brute@cpu1".parse().unwrap())?;
+    /// let wrong = Aabb::cube([f32::NAN; 3], 1.0);
+    /// let told = brute.find_pairs(&[wrong], &mut Pairs::new());
+    /// assert_eq!(told, Err(Error::InvalidBox { index: 0, defect: BoxDefect::NotANumber }));
+    /// # Ok::<(), sapwise::Error>(())
+    /// ```
     #[derive(Debug, Clone, PartialEq)]
     #[non_exhaustive]
     pub enum Error {

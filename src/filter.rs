@@ -7,6 +7,14 @@ use crate::pair::Pair;
 pub(crate) use screen::Screen;
 
 /// The groups and the mask of a box, as in most physics engines.
+///
+/// ```
+/// use sapwise::Membership;
+///
+/// let wall = Membership { fixed: true, ..Membership::ALL };
+/// let player = Membership { groups: 0b10, owner: 7, ..Membership::ALL };
+/// assert!(player.wants(&wall) && !wall.wants(&wall) && !player.wants(&player));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Membership {
@@ -62,6 +70,14 @@ impl Default for Membership {
 /// A filter takes 17 bytes for each box. `bvh` and `pair-cache` take 17 more for each box if that set alone does not
 /// rule out all unwanted pairs. The first frame after a change of the filter finds that set in one pass over the
 /// memberships.
+///
+/// ```
+/// use sapwise::{Filter, Membership};
+///
+/// let arm = Membership { owner: 1, ..Membership::ALL };
+/// let filter = Filter::new(vec![arm, arm, Membership::ALL]);
+/// assert!(!filter.wants((0, 1)) && filter.wants((0, 2)));
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Filter {
     /// The membership of each box, by its position in the input. A box beyond the end is [`Membership::ALL`].

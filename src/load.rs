@@ -45,6 +45,13 @@ pub struct Load {
 
 impl Load {
     /// Makes the load of a frame of `objects` boxes without pairs and without motion.
+    ///
+    /// ```
+    /// use sapwise::algorithm::Load;
+    ///
+    /// let load = Load::of_objects(1000).with_pairs(450.0);
+    /// assert_eq!((load.objects, load.pairs), (1000, 450.0));
+    /// ```
     #[must_use]
     pub fn of_objects(objects: u32) -> Self {
         Self { objects, ..Self::default() }

@@ -30,6 +30,17 @@ pub enum PairOrder {
 /// The caller owns the list and reuses it for every frame. Its memory grows to the largest frame and stays.
 ///
 /// With a [`Filter`], the list writes, counts and limits only the wanted pairs, whatever algorithm finds them.
+///
+/// ```
+/// use sapwise::{PairOrder, Pairs};
+///
+/// let mut pairs = Pairs::with_order(PairOrder::Canonical);
+/// pairs.push(1, 2);
+/// pairs.push(0, 3);
+/// pairs.finish()?;
+/// assert_eq!(pairs.as_slice(), [(0, 3), (1, 2)]);
+/// # Ok::<(), sapwise::Error>(())
+/// ```
 #[derive(Debug, Clone, Default)]
 pub struct Pairs {
     /// Initialised up to the largest frame, so that growth within it writes each pair once.

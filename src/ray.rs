@@ -3,6 +3,13 @@
 use crate::described::described;
 
 /// A ray, or the segment of one: the points `origin + t × direction` with `0 <= t <= max`.
+///
+/// ```
+/// use sapwise::Ray;
+///
+/// let segment = Ray { max: 10.0, ..Ray::new([0.0; 3], [0.0, 0.0, 1.0]) };
+/// assert_eq!(segment.defect(), None);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
     /// Where it begins.

@@ -15,6 +15,17 @@ type Factory = Arc<dyn Fn(&[u32]) -> Made + Send + Sync>;
 /// All known algorithms, each with the reason if it can't run here.
 ///
 /// A registry starts with the built-in algorithms. Those that a user adds are swept, modelled and chosen like the rest.
+///
+/// ```
+/// use sapwise::{Aabb, BroadPhase, Pairs, Registry};
+///
+/// let registry = Registry::new();
+/// let mut bvh = registry.create(&"bvh@cpu1".parse().unwrap())?;
+/// let mut pairs = Pairs::new();
+/// bvh.find_pairs(&[Aabb::cube([0.0; 3], 1.0); 2], &mut pairs)?;
+/// assert_eq!(pairs.len(), 1);
+/// # Ok::<(), sapwise::Error>(())
+/// ```
 pub struct Registry {
     entries: Vec<Entry>,
     makers: Vec<Maker>,

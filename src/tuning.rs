@@ -129,6 +129,15 @@ impl AlgorithmCost {
 impl Tuning {
     /// A tuning of hand-written thresholds.
     ///
+    /// ```
+    /// use sapwise::Tuning;
+    /// use sapwise::tuning::Step;
+    ///
+    /// let steps = [(0, "brute@cpu1"), (60, "pair-cache@cpu1")].map(|(from, id)| Step::new(from, id.parse().unwrap()));
+    /// let tuning = Tuning::from_steps(steps.to_vec()).expect("steps that ascend from 0");
+    /// assert_eq!(tuning.step(100).unwrap().algorithm.method(), "pair-cache");
+    /// ```
+    ///
     /// # Errors
     /// When the list is empty, does not begin at 0 or is not ascending.
     pub fn from_steps(steps: Vec<Step>) -> Result<Self, TuningError> {

@@ -6,6 +6,10 @@ use crate::tuning::Source;
 use std::fmt;
 
 /// Why an algorithm was chosen.
+///
+/// ```
+/// assert_eq!(sapwise::Reason::Stayed.to_string(), "still the cheapest");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Reason {
@@ -37,6 +41,18 @@ impl fmt::Display for Reason {
 }
 
 /// The last decision and what it rested on. As a text it is one sentence for people, whose wording may change.
+///
+/// ```
+/// use sapwise::{Aabb, Adaptive, BroadPhase, Pairs, Reason, Registry, Tuning};
+///
+/// let registry = Registry::new();
+/// let mut adaptive = Adaptive::new(Tuning::usual(&registry), &registry)?;
+/// adaptive.find_pairs(&[Aabb::cube([0.0; 3], 1.0); 9], &mut Pairs::new())?;
+/// let decision = adaptive.last_decision().expect("a frame ran");
+/// assert_eq!((decision.reason, decision.load.objects), (Reason::First, 9));
+/// println!("{decision}"); // a sentence
+/// # Ok::<(), sapwise::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Decision<'a> {

@@ -6,6 +6,13 @@ use std::sync::Arc;
 /// Why a GPU can't do its work.
 ///
 /// The text leaves out the words of the driver, which are the [source](std::error::Error::source); `{:#}` writes both.
+///
+/// ```
+/// use sapwise::error::{GpuError, GpuErrorKind};
+///
+/// let lost = GpuError::new(GpuErrorKind::Lost, "gpu0 did not answer");
+/// assert_eq!((lost.kind(), lost.to_string()), (GpuErrorKind::Lost, "gpu0 did not answer".to_owned()));
+/// ```
 #[derive(Debug, Clone)]
 pub struct GpuError {
     kind: GpuErrorKind,

@@ -13,6 +13,19 @@ use crate::ray::Ray;
 /// Queries see boxes as they were at the last [`update`](Space::update), and bodies as they were set last. Those that
 /// were removed since are left out. The first query after an update builds a tree of the active bodies; any number of
 /// threads may query at once.
+///
+/// ```
+/// use sapwise::{Aabb, Body, Space};
+///
+/// let mut space = Space::new();
+/// let near = space.insert(Aabb::cube([1.0, 0.0, 0.0], 0.5), Body::default())?;
+/// space.insert(Aabb::cube([9.0, 0.0, 0.0], 0.5), Body::default())?;
+/// space.update()?;
+/// let mut found = Vec::new();
+/// space.all().query_box(&Aabb::cube([0.0; 3], 2.0), |handle| found.push(handle))?;
+/// assert_eq!(found, [near]);
+/// # Ok::<(), sapwise::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct View<'a> {
     space: &'a Space,
