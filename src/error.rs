@@ -122,6 +122,15 @@ described! {
 
 described! {
     /// Why an algorithm can't run here.
+    ///
+    /// ```
+    /// use sapwise::error::{Error, Unavailable};
+    /// use sapwise::Registry;
+    ///
+    /// let told = Registry::with_cores(2).create(&"sap@cpu4".parse().unwrap()).err();
+    /// let too_few = |why| matches!(why, Error::Unavailable { reason: Unavailable::TooFewCores { threads: 4, .. }, .. });
+    /// assert!(told.is_some_and(too_few));
+    /// ```
     #[derive(Debug, Clone, PartialEq, Eq)]
     #[non_exhaustive]
     pub enum Unavailable {
