@@ -5,7 +5,7 @@
 #   tools/python.sh wheel      # builds the wheel and tells where it is
 #   tools/python.sh sdist      # builds the source distribution, and installs it
 #   tools/python.sh aarch64    # builds the wheel for 64-bit ARM with zig, and uses it in QEMU
-#   tools/python.sh bench      # the figures: overhead, other libraries, sizes, time of the import
+#   tools/python.sh bench      # times: overhead, other libraries, the import; into results/python.csv
 #   tools/python.sh examples   # runs bindings/python/examples/ and writes their pictures to target/python/examples/
 #   tools/python.sh index      # writes the index of docs/python.md from the docstrings
 #
@@ -123,7 +123,9 @@ bench)
     sizes
     cargo build --quiet --release --locked --manifest-path bindings/python/Cargo.toml --example figures
     cd "$folder"
-    fresh/bin/python "$root/bindings/python/benches/figures.py" "$CARGO_TARGET_DIR/release/examples/figures"
+    fresh/bin/python "$root/bindings/python/benches/figures.py" "$CARGO_TARGET_DIR/release/examples/figures" >bench.csv
+    machine="$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -1) ($(nproc) cores)"
+    sed "1s/^/machine,date,/; 2,\$s/^/$machine,$(date +%F),/" bench.csv | tee "$root/results/python.csv"
     ;;
 examples)
     wheel

@@ -1,4 +1,4 @@
-"""The figures of the Python package, interleaved in one run: `tools/python.sh bench`.
+"""Times of the Python package in nanoseconds, interleaved in one run, as CSV: `tools/python.sh bench`.
 
 Overhead: wall clock of `sapwise.pairs`, and of a `Space` in which all boxes move, with the array of its pairs, less
 that of the library's own calls on the same boxes, in a process of Rust beside this one; the two take turns.
@@ -28,7 +28,7 @@ import sapwise
 
 RUST = sys.argv[1]
 #: No call of the others can take work from the frame before.
-FOLLOWING = "BroadPhase.find, frames that follow each other"
+FOLLOWING = "sapwise.BroadPhase.find of frames that follow each other"
 # What this machine has kept is not part of it: thresholds decide.
 os.environ["XDG_CACHE_HOME"] = tempfile.mkdtemp(prefix="sapwise-figures-")
 FOLDER = Path(tempfile.mkdtemp(prefix="sapwise-figures-"))
@@ -41,21 +41,17 @@ def scene(objects, frames=1, seed=1):
     return np.fromfile(path, np.float32).reshape(frames, objects, 6), path
 
 
-def quartiles(samples):
-    return np.quantile(np.asarray(samples, float), [0.25, 0.5, 0.75])
-
-
-def text(samples_ns):
-    low, median, high = quartiles(samples_ns)
-    unit, name = (1e3, "µs") if median < 1e6 else (1e6, "ms")
-    return f"{median / unit:.4g} {name} ({low / unit:.4g} to {high / unit:.4g})"
+def row(what, objects, pairs, contestant, samples_ns):
+    low, median, high = np.quantile(np.asarray(samples_ns, float), [0.25, 0.5, 0.75])
+    print(f"{what},{objects},{pairs},{contestant},{len(samples_ns)},{low:.0f},{median:.0f},{high:.0f}", flush=True)
 
 
 def overhead(objects, visits, frames):
     (boxes,), path = scene(objects)
-    sapwise.pairs(boxes)
-    algorithm = sapwise.last_decision().algorithm
-    compare("pairs", lambda: sapwise.pairs(boxes), [RUST, "serve", str(path), algorithm], objects, visits, frames)
+    # From scratch in each frame.
+    algorithm = "bvh@cpu1"
+    call = lambda: sapwise.pairs(boxes, algorithm=algorithm)
+    compare("pairs", call, [RUST, "serve", str(path), algorithm], objects, visits, frames)
 
 
 def overhead_of_space(objects, visits, frames):
@@ -94,11 +90,8 @@ def compare(name, call, command, objects, visits, frames):
     serve.stdin.close()
     serve.wait()
     more = np.array(python) - np.array(rust)
-    low, median, high = quartiles(more / 1e3)
-    low_share, share, high_share = 100 * quartiles(more / rust)
-    print(f"{name}, {objects} boxes, {count} pairs, {command[-1]}, {visits} visits of {frames} frames each:")
-    print(f"  Rust {text(rust)}, Python {text(python)}")
-    print(f"  overhead {median:.1f} µs ({low:.1f} to {high:.1f}), {share:.2f} % ({low_share:.2f} to {high_share:.2f})")
+    for contestant, samples in (("Rust", rust), ("Python", python), ("Python less Rust", more)):
+        row(f"{name} by {command[-1]}", objects, count, contestant, samples)
 
 
 def contestants(frames):
@@ -112,6 +105,10 @@ def contestants(frames):
     manager.setup()
     broad_phase = sapwise.BroadPhase(cache=False, measure=False)
     following = iter(frames)
+    # In another order each time: no call has a use for what was kept of the previous one.
+    order = np.random.default_rng(2)
+    shuffled = iter([order.permutation(boxes) for _ in frames])
+    shuffled_wide = iter([order.permutation(wide) for _ in frames])
 
     def by_fcl():
         count = [0]
@@ -139,11 +136,11 @@ def contestants(frames):
         return sum(j > k for k, box in enumerate(wide) for j in tree.intersection(box))
 
     return {
-        "sapwise.pairs": lambda: len(sapwise.pairs(boxes)),
-        "sapwise.pairs, float64": lambda: len(sapwise.pairs(wide)),
+        "sapwise.pairs": lambda: len(sapwise.pairs(next(shuffled))),
+        "sapwise.pairs of float64": lambda: len(sapwise.pairs(next(shuffled_wide))),
         FOLLOWING: lambda: len(broad_phase.find(next(following))),
         "python-fcl DynamicAABBTree": by_fcl,
-        "rtree, intersection_v": by_rtree,
+        "rtree intersection_v": by_rtree,
         "scipy cKDTree.query_pairs": by_scipy,
         "trimesh bounds_tree": by_trimesh,
     }
@@ -162,12 +159,9 @@ def others(objects, rounds):
             # Drops the first round, which is cold.
             if a_round > 0:
                 times[name].append(time.perf_counter_ns() - began)
-    same = {count for name, count in counts.items() if name != FOLLOWING}
-    assert len(same) == 1, counts
-    print(f"{objects} boxes of `uniform`, {same.pop()} pairs of each, n = {rounds}, all in turns:")
-    best = min(np.median(times[name]) for name in names if not name.startswith(("sapwise", "BroadPhase")))
+    assert len({count for name, count in counts.items() if name != FOLLOWING}) == 1, counts
     for name in names:
-        print(f"  {name}: {text(times[name])}, the best of the others takes {best / np.median(times[name]):.3g}×")
+        row("all pairs", objects, counts[name], name, times[name])
 
 
 def imports():
@@ -175,13 +169,14 @@ def imports():
         script = f"import {first}; began = time.perf_counter_ns(); import sapwise; print(time.perf_counter_ns() - began)"
         command = [sys.executable, "-c", script]
         run = lambda: int(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
-        print(f"import sapwise {name}: {text([run() for _ in range(21)][1:])}, n = 20")
+        row(f"import {name}", 0, 0, "sapwise", [run() for _ in range(21)][1:])
 
 
 warnings.simplefilter("ignore", sapwise.ConversionWarning)
+print("what,boxes,pairs,contestant,samples,low_ns,median_ns,high_ns")
 imports()
 for measured in (overhead, overhead_of_space):
     measured(1000, 200, 50)
     measured(1_000_000, 12, 3)
-others(10_000, 31)
-others(100_000, 9)
+others(10_000, 15)
+others(100_000, 3)

@@ -9,18 +9,12 @@ use numpy::PyArray2;
 use numpy::ndarray::Array2;
 use pyo3::prelude::*;
 use sapwise::algorithm::Load;
-use sapwise::tuning::Step;
-use sapwise::{
-    Aabb, Adaptive, AlgorithmId, Between, BroadPhase, Error, Filter, PairOrder, Pairs, Registry, Tuning, Worlds,
-};
+use sapwise::{Aabb, Adaptive, Between, BroadPhase, Error, Filter, PairOrder, Pairs, Registry, Worlds};
 use sapwise_tune::StartOptions;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Built-in thresholds, in boxes, for an unknown machine: `grid-sap` replaces `brute` from the first on, and runs on
-/// `k` threads from `k` squared times the second on. Rounded from `uniform` and `clustered` in `datasets/`.
-const GRID_FROM: u32 = 300;
-const THREADS_FROM: u32 = 2500;
-const MOST_THREADS: u32 = 16;
+/// Fewest boxes for an estimate of how they lie. For fewer it costs more than it saves.
+const WORTH_AN_ESTIMATE: usize = 2500;
 
 /// Largest call whose buffers are kept for the next: a few hundred megabytes.
 const MOST_BOXES_KEPT: usize = 2_000_000;
@@ -60,8 +54,6 @@ pub(crate) struct Exactly<'a> {
 struct Engine {
     registry: Arc<Registry>,
     adaptive: Adaptive,
-    /// Whether built-in thresholds decide.
-    is_usual: bool,
     /// One for each algorithm that callers have named, with the name.
     named: Vec<(String, Adaptive)>,
     between: Between,
@@ -133,13 +125,10 @@ impl Engine {
     fn new() -> Result<Self, Error> {
         let registry = Arc::new(Registry::new());
         let options = StartOptions::new().background(false).measure(None).registry(Arc::clone(&registry));
-        let tuning = sapwise_tune::for_this_machine(&options)?.tuning().clone();
-        let is_usual = tuning.costs.is_empty();
-        let mut adaptive = Adaptive::new(if is_usual { usual(&registry)? } else { tuning }, &registry)?;
+        let mut adaptive = sapwise_tune::for_this_machine(&options)?;
         adaptive.set_exploring(false);
         Ok(Self {
             adaptive,
-            is_usual,
             named: Vec::new(),
             between: Between::new(&registry)?,
             worlds: Worlds::new(&registry)?,
@@ -187,7 +176,7 @@ impl Engine {
 
     fn run(&mut self, what: What<'_>, pairs: &mut Pairs) -> Result<(), Error> {
         match what {
-            What::All(boxes) if self.is_usual && lie_on_one_axis(boxes) => {
+            What::All(boxes) if self.adaptive.tuning().costs.is_empty() && lie_on_one_axis(boxes) => {
                 let steps = &self.adaptive.tuning().steps;
                 let step = steps.iter().rfind(|step| step.from_objects as usize <= boxes.len());
                 let sweep = format!("sap@cpu{}", step.map_or(1, |step| step.algorithm.threads()));
@@ -235,10 +224,10 @@ impl Engine {
     }
 }
 
-/// Returns whether most boxes that overlap on the best axis overlap: then nothing is faster than a sweep along it. For
-/// fewer boxes the estimate costs more than it saves.
+/// Returns whether most boxes that overlap on the best axis overlap: then nothing is faster than a sweep along it, and
+/// thresholds don't know that.
 fn lie_on_one_axis(boxes: &[Aabb]) -> bool {
-    boxes.len() >= THREADS_FROM as usize && {
+    boxes.len() >= WORTH_AN_ESTIMATE && {
         let load = Load::estimate(boxes, None, None);
         load.axis_candidates <= 2.0 * load.pairs
     }
@@ -246,22 +235,6 @@ fn lie_on_one_axis(boxes: &[Aabb]) -> bool {
 
 fn load(boxes: usize, pairs: &Pairs) -> Load {
     Load::of_objects(u32::try_from(boxes).unwrap_or(u32::MAX)).with_pairs(pairs.len() as f64)
-}
-
-/// Returns the built-in thresholds, without incremental algorithms.
-fn usual(registry: &Registry) -> Result<Tuning, Error> {
-    let known: Vec<AlgorithmId> = registry.available().into_iter().map(|entry| entry.id).collect();
-    let step = |from: u32, method: &str, threads: u32| {
-        let id = known.iter().find(|id| id.method() == method && id.threads() == threads)?;
-        Some(Step::new(from, id.clone()))
-    };
-    let mut steps: Vec<Step> = step(0, "brute", 1).into_iter().chain(step(GRID_FROM, "grid-sap", 1)).collect();
-    let mut widths: Vec<u32> =
-        known.iter().map(AlgorithmId::threads).filter(|k| (2..=MOST_THREADS).contains(k)).collect();
-    widths.sort_unstable();
-    widths.dedup();
-    steps.extend(widths.into_iter().filter_map(|k| step(THREADS_FROM * k * k, "grid-sap", k)));
-    Tuning::from_steps(steps).map_err(|_| Error::NoAlgorithm)
 }
 
 /// Converts pairs to numbers, two each.

@@ -1,17 +1,15 @@
 //! The class `BroadPhase`.
 
 use crate::boxes::boxes;
-use crate::decision::PyDecision;
 use crate::engine::two_columns;
 use crate::error::{call, exception, unusable};
 use crate::filter::Keywords;
 use crate::frame::{Flat, Frames, Ids};
-use crate::held::Held;
+use crate::held::{Held, learning_methods};
 use crate::start::{self, Start};
 use crate::tuning::PyTuning;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 use sapwise::Membership;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -233,69 +231,6 @@ impl PyBroadPhase {
     fn ended<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.changed(py, false)
     }
-
-    /// Decision or None: what was decided for the last frame, and why; None before the first.
-    #[getter]
-    fn last_decision(&self, py: Python<'_>) -> PyResult<Option<PyDecision>> {
-        self.frames.last_decision(py)
-    }
-
-    /// Tuning: the expected cost of each algorithm, corrected by what was learned.
-    #[getter]
-    fn tuning(&self, py: Python<'_>) -> PyResult<PyTuning> {
-        self.frames.tuning(py)
-    }
-
-    /// dict: where the tuning came from (``origin``), ``remarks`` on what went wrong, ``seconds``, the ``file`` of
-    /// the cache.
-    #[getter]
-    fn setup<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        self.frames.setup(py)
-    }
-
-    /// Keep what was learned for the next start on this machine.
-    ///
-    /// Returns
-    /// -------
-    /// bool
-    ///     False if there is nothing to keep yet.
-    ///
-    /// Raises
-    /// ------
-    /// SapwiseError
-    ///     There is no cache, or it can't be written.
-    fn save(&self, py: Python<'_>) -> PyResult<bool> {
-        self.frames.save(py)
-    }
-
-    /// End its threads and free its memory. It can't be used afterwards. Closing it twice does nothing.
-    fn close(&self, py: Python<'_>) {
-        self.frames.close(py);
-    }
-
-    /// bool: whether it was closed.
-    #[getter]
-    fn closed(&self) -> bool {
-        self.frames.is_closed()
-    }
-
-    fn __enter__(this: PyRef<'_, Self>) -> PyRef<'_, Self> {
-        this
-    }
-
-    #[pyo3(signature = (kind, value, trace))]
-    fn __exit__(
-        &self,
-        py: Python<'_>,
-        kind: Option<&Bound<'_, PyAny>>,
-        value: Option<&Bound<'_, PyAny>>,
-        trace: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<bool> {
-        let _ = (kind, value, trace);
-        self.frames.exit(py)
-    }
-
-    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        self.frames.text(py, "no frame yet")
-    }
 }
+
+learning_methods!(PyBroadPhase, frames);

@@ -52,6 +52,7 @@ pub(crate) struct Frames {
 
 impl Searcher for Frames {
     const CLASS: &'static str = "BroadPhase";
+    const UNUSED: &'static str = "no frame yet";
 
     fn forked(_: &RwLock<Self>, adaptive: Adaptive, start: &Start) -> Result<Self, String> {
         Ok(Self::new(adaptive, start))

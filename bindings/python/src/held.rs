@@ -13,6 +13,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 pub(crate) trait Searcher: Send + Sync + Sized {
     /// The name of its class.
     const CLASS: &'static str;
+    /// What its text says before the first search.
+    const UNUSED: &'static str;
 
     /// Makes it anew in a forked process, which has none of its threads.
     ///
@@ -147,14 +149,88 @@ impl<T: Searcher> Held<T> {
     }
 
     /// Returns the text of `repr`.
-    pub(crate) fn text(&self, py: Python<'_>, unused: &str) -> PyResult<String> {
+    pub(crate) fn text(&self, py: Python<'_>) -> PyResult<String> {
         if self.is_closed() {
             return Ok(format!("<sapwise.{}, closed>", T::CLASS));
         }
         let last = self.last_decision(py)?;
         Ok(last.map_or_else(
-            || format!("<sapwise.{}, {unused}>", T::CLASS),
+            || format!("<sapwise.{}, {}>", T::CLASS, T::UNUSED),
             |decision| format!("<sapwise.{}: {}>", T::CLASS, decision.sentence),
         ))
     }
 }
+
+/// Gives a class the methods of what it holds, in the field `$held`.
+macro_rules! learning_methods {
+    ($class:ident, $held:ident) => {
+        #[pymethods]
+        impl $class {
+            /// Decision or None: what was decided for the last frame or update, and why; None before the first.
+            #[getter]
+            fn last_decision(&self, py: Python<'_>) -> PyResult<Option<$crate::decision::PyDecision>> {
+                self.$held.last_decision(py)
+            }
+
+            /// Tuning: the expected cost of each algorithm, corrected by what was learned.
+            #[getter]
+            fn tuning(&self, py: Python<'_>) -> PyResult<$crate::tuning::PyTuning> {
+                self.$held.tuning(py)
+            }
+
+            /// dict: where the tuning came from (``origin``), ``remarks`` on what went wrong, ``seconds``, the
+            /// ``file`` of the cache.
+            #[getter]
+            fn setup<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, pyo3::types::PyDict>> {
+                self.$held.setup(py)
+            }
+
+            /// Keep what was learned for the next start on this machine.
+            ///
+            /// Returns
+            /// -------
+            /// bool
+            ///     False if there is nothing to keep yet.
+            ///
+            /// Raises
+            /// ------
+            /// SapwiseError
+            ///     There is no cache, or it can't be written.
+            fn save(&self, py: Python<'_>) -> PyResult<bool> {
+                self.$held.save(py)
+            }
+
+            /// End its threads and free its memory. It can't be used afterwards. Closing it twice does nothing.
+            fn close(&self, py: Python<'_>) {
+                self.$held.close(py);
+            }
+
+            /// bool: whether it was closed.
+            #[getter]
+            fn closed(&self) -> bool {
+                self.$held.is_closed()
+            }
+
+            fn __enter__(this: PyRef<'_, Self>) -> PyRef<'_, Self> {
+                this
+            }
+
+            #[pyo3(signature = (kind, value, trace))]
+            fn __exit__(
+                &self,
+                py: Python<'_>,
+                kind: Option<&Bound<'_, PyAny>>,
+                value: Option<&Bound<'_, PyAny>>,
+                trace: Option<&Bound<'_, PyAny>>,
+            ) -> PyResult<bool> {
+                let _ = (kind, value, trace);
+                self.$held.exit(py)
+            }
+
+            fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+                self.$held.text(py)
+            }
+        }
+    };
+}
+pub(crate) use learning_methods;

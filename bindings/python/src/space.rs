@@ -1,22 +1,21 @@
 //! The class `Space`.
 
 use crate::boxes::kept;
-use crate::decision::PyDecision;
 use crate::error::{exception, invalid_box, unusable};
 use crate::filter::Keywords;
 use crate::handles::{array, bits, check, first_stale, handles, pairs};
-use crate::held::{Held, Searcher};
+use crate::held::{Held, Searcher, learning_methods};
 use crate::start::{self, Start};
 use crate::tuning::PyTuning;
 use crate::view::PyView;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 use sapwise::{Aabb, Adaptive, Body, Error, Handle, Membership, Space};
 use std::sync::{Arc, PoisonError, RwLock, TryLockError};
 
 impl Searcher for Space {
     const CLASS: &'static str = "Space";
+    const UNUSED: &'static str = "no update yet";
 
     fn forked(parent: &RwLock<Self>, adaptive: Adaptive, _: &Start) -> Result<Self, String> {
         let parent = match parent.try_read() {
@@ -343,40 +342,6 @@ impl PySpace {
         Ok(PyView { held: Arc::clone(&self.held), by: Some(by.into()) })
     }
 
-    /// Decision or None: what was decided for the last update, and why; None before the first.
-    #[getter]
-    fn last_decision(&self, py: Python<'_>) -> PyResult<Option<PyDecision>> {
-        self.held.last_decision(py)
-    }
-
-    /// Tuning: the expected cost of each algorithm, corrected by what was learned.
-    #[getter]
-    fn tuning(&self, py: Python<'_>) -> PyResult<PyTuning> {
-        self.held.tuning(py)
-    }
-
-    /// dict: where the tuning came from, as in ``BroadPhase``.
-    #[getter]
-    fn setup<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        self.held.setup(py)
-    }
-
-    /// Keep what was learned for the next start on this machine, as ``BroadPhase.save`` does.
-    fn save(&self, py: Python<'_>) -> PyResult<bool> {
-        self.held.save(py)
-    }
-
-    /// End its threads and free its memory. It can't be used afterwards. Closing it twice does nothing.
-    fn close(&self, py: Python<'_>) {
-        self.held.close(py);
-    }
-
-    /// bool: whether it was closed.
-    #[getter]
-    fn closed(&self) -> bool {
-        self.held.is_closed()
-    }
-
     fn __len__(&self, py: Python<'_>) -> PyResult<usize> {
         self.held.read(py, Space::len)
     }
@@ -385,27 +350,9 @@ impl PySpace {
         self.held.read(py, |space| Handle::from_bits(handle).is_some_and(|handle| space.contains(handle)))
     }
 
-    fn __enter__(this: PyRef<'_, Self>) -> PyRef<'_, Self> {
-        this
-    }
-
-    #[pyo3(signature = (kind, value, trace))]
-    fn __exit__(
-        &self,
-        py: Python<'_>,
-        kind: Option<&Bound<'_, PyAny>>,
-        value: Option<&Bound<'_, PyAny>>,
-        trace: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<bool> {
-        let _ = (kind, value, trace);
-        self.held.exit(py)
-    }
-
-    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        self.held.text(py, "no update yet")
-    }
-
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         crate::snapshot::reduced(py, &self.held)
     }
 }
+
+learning_methods!(PySpace, held);
