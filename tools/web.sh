@@ -6,7 +6,7 @@
 #   tools/web.sh build      # builds only
 #   tools/web.sh browser    # also tests the page in headless Chromium, and the report of its probe by `sapwise check`
 #   tools/web.sh bench      # measures into results/web.csv, beside libraries from npm; on a quiet machine
-#   tools/web.sh probes     # runs the probe of the page 20 times into results/web-probes.csv: about 20 minutes
+#   tools/web.sh probes     # runs the probe of the page 20 times into results/web-probes.csv: at most 20 minutes
 #
 # PROBES   runs of the probe [default: 20]
 # VECTORS  +simd128, or -simd128 for browsers without WebAssembly SIMD [default: +simd128]

@@ -58,7 +58,7 @@ async function compare(native) {
   const boxes = new Scene("uniform", OBJECTS, 1).boxes().slice();
   const file = join(mkdtempSync(join(tmpdir(), "sapwise-bench-")), "boxes.f32");
   writeFileSync(file, new Uint8Array(boxes.buffer));
-  const contestants = { "sapwise, WebAssembly": () => findPairs(boxes) };
+  const contestants = { "sapwise WebAssembly": () => findPairs(boxes) };
   for (const [name, find] of Object.entries(libraries)) contestants[name] = () => find(boxes);
   const pairs = findPairs(boxes).length;
   for (const [name, run] of Object.entries(contestants)) {
@@ -72,7 +72,7 @@ async function compare(native) {
   };
   // In turn, so that what disturbs the machine disturbs all.
   const times = Array.from({ length: ROUNDS }, () => {
-    const round = { "sapwise, native": natively() };
+    const round = { "sapwise native": natively() };
     for (const [name, run] of Object.entries(contestants)) round[name] = calls(run);
     return round;
   });
@@ -80,8 +80,8 @@ async function compare(native) {
     add(`findPairs of ${OBJECTS}`, name, "ms", times.map((round) => round[name]));
   }
   const over = (a, b) => times.map((round) => round[a] / round[b]);
-  const ours = "sapwise, WebAssembly";
-  add(`findPairs of ${OBJECTS}`, "WebAssembly over native", "ratio", over(ours, "sapwise, native"), 3);
+  const ours = "sapwise WebAssembly";
+  add(`findPairs of ${OBJECTS}`, "WebAssembly over native", "ratio", over(ours, "sapwise native"), 3);
   for (const name of Object.keys(libraries)) {
     add(`findPairs of ${OBJECTS}`, `${name} over WebAssembly`, "ratio", over(name, ours), 3);
   }
