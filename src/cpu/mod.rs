@@ -22,7 +22,7 @@ mod tree;
 mod workers;
 mod world;
 
-pub(crate) use columns::{Columns, part, reserve, split};
+pub(crate) use columns::{Columns, ensure, part, reserve, split};
 #[cfg(feature = "parallel")]
 pub use helpers::pinned_pool;
 pub(crate) use kernel::node::{Group, LANES};

@@ -4,7 +4,8 @@
 //! Within a bucket only the rest of a key counts. It usually has 32 bits, which halves the bytes moved. With several
 //! threads, each first sorts its own share into buckets, and then all shares of a bucket are joined.
 
-use crate::cpu::{Workers, split};
+use crate::cpu::{Workers, ensure, split};
+use crate::error::Error;
 use crate::pair::Pair;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
@@ -94,21 +95,19 @@ impl Sorter {
         if list.is_sorted_by_key(|t| t.key()) {
             return;
         }
-        let sorted = if list.len() < FEW || u32::try_from(list.len()).is_err() {
-            None
-        } else if list.len() < SMALLEST_SHARED || on.threads() == 1 {
-            self.sort_on(&Workers::one(), list)
-        } else {
-            self.sort_on(on, list)
-        };
-        // In place, without buffers.
-        if sorted.is_none() {
+        let by_radix = list.len() >= FEW && u32::try_from(list.len()).is_ok();
+        let on = if list.len() < SMALLEST_SHARED { &Workers::one() } else { on };
+        if !by_radix || self.sort_on(on, list).is_err() {
+            // In place, without buffers.
             list.sort_unstable_by_key(|t| t.key());
         }
     }
 
-    /// Returns `None`, and does nothing, if memory is refused.
-    fn sort_on<T: Keyed>(&mut self, on: &Workers, list: &mut [T]) -> Option<()> {
+    /// Sorts a list with the buffers.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]. Then the list is as it was.
+    fn sort_on<T: Keyed>(&mut self, on: &Workers, list: &mut [T]) -> Result<(), Error> {
         let Self { narrow, wide, starts } = self;
         let layout = Layout::of(on, list);
         let len = list.len();
@@ -118,13 +117,16 @@ impl Sorter {
         } else {
             (on.threads() * SHARES_PER_THREAD).min(len / layout.buckets / 16).max(1)
         };
-        let starts = ensure(starts, shares * (layout.buckets + 1))?;
+        let counters = shares * (layout.buckets + 1);
+        ensure(starts, counters, "sort keys")?;
         if layout.rest <= u32::BITS {
-            by_buckets(on, list, ensure(narrow, len)?, starts, layout);
+            ensure(narrow, len, "sort keys")?;
+            by_buckets(on, list, &mut narrow[..len], &mut starts[..counters], layout);
         } else {
-            by_buckets(on, list, ensure(wide, len)?, starts, layout);
+            ensure(wide, len, "sort keys")?;
+            by_buckets(on, list, &mut wide[..len], &mut starts[..counters], layout);
         }
-        Some(())
+        Ok(())
     }
 }
 
@@ -216,15 +218,6 @@ fn by_buckets<T: Keyed, K: Keyed>(on: &Workers, list: &mut [T], rests: &mut [K],
     on.each_of(split(list, sizes()).zip(split(rests, sizes())).enumerate(), |(bucket, (list, rests))| {
         sort_bucket(list, rests, shares > 1, layout.base(bucket), layout);
     });
-}
-
-/// Returns the first `len` elements of a list, which grows to that length. `None` if memory is refused.
-fn ensure<T: Copy + Default>(list: &mut Vec<T>, len: usize) -> Option<&mut [T]> {
-    if list.len() < len {
-        list.try_reserve(len - list.len()).ok()?;
-        list.resize(len, T::default());
-    }
-    Some(&mut list[..len])
 }
 
 /// Sorts `from` by digit, stably, and writes `make` of each element to `to`. `starts` has a counter for each digit: all
