@@ -52,8 +52,3 @@ pub use training::{
     Coverage, Floor, MethodScore, Regrets, Split, StoredModel, Training, TrainingReport, Validation, read_model,
     write_model,
 };
-
-/// The example of the guide for researchers as a test.
-#[cfg(doctest)]
-#[doc = include_str!("../../../docs/measuring.md")]
-struct Research;

@@ -195,7 +195,7 @@ impl StoredModel {
     /// # Errors
     /// Never, unless the file was changed by hand.
     pub fn built_in() -> Result<Self, json::Error> {
-        read_model(include_str!("../../../models/default.json"))
+        read_model(include_str!("../default.json"))
     }
 }
 
