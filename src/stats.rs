@@ -10,7 +10,7 @@ pub fn normal_density(x: f64) -> f64 {
 }
 
 /// Returns the mean; 0 for no values.
-#[cfg(all(test, feature = "serde"))]
+#[cfg(test)]
 pub(crate) fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }

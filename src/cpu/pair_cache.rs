@@ -83,7 +83,7 @@ fn pair_cache(threads: &[u32], pools: &Threads, simd: Simd, timed: bool) -> Resu
     let tasks = widest.tasks();
     Ok(PairCache {
         outputs: Outputs::default(),
-        motion: Motion::new(timed),
+        motion: Motion::new(timed, widths.len()),
         grown: Grown::new(simd),
         tree: GrownTree::new(simd),
         upkeep: Upkeep::new(timed),
@@ -164,6 +164,7 @@ impl BroadPhase for PairCache {
     fn set_threads(&mut self, threads: u32) -> bool {
         let Some(width) = self.widths.iter().position(|w| w.threads() == threads as usize) else { return false };
         self.width = width;
+        self.motion.set_width(width);
         self.workers = self.widths[width].fit(self.fitted_for);
         true
     }

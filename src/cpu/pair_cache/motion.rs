@@ -141,15 +141,15 @@ impl Keeping {
 }
 
 impl Motion {
-    /// `timed`: measured times decide, and not the cost model alone.
-    pub(super) fn new(timed: bool) -> Self {
+    /// `timed`: measured times decide, and not the cost model alone. `widths`: numbers of threads.
+    pub(super) fn new(timed: bool, widths: usize) -> Self {
         Self {
             displacement: Displacement::default(),
             density: None,
             keeping: None,
             told: None,
             most_margin: MARGINS[MARGINS.len() - 1],
-            prices: Prices::new(timed),
+            prices: Prices::new(timed, widths),
         }
     }
 
@@ -181,6 +181,12 @@ impl Motion {
             self.most_margin = (0.5 * failed.margin.share).max(MARGINS[0]);
         }
         self.prices.failed(failed.cost, too_many);
+    }
+
+    /// Goes on with another number of threads. Which margin failed on others says little.
+    pub(super) fn set_width(&mut self, width: usize) {
+        self.prices.set_width(width);
+        self.most_margin = MARGINS[MARGINS.len() - 1];
     }
 
     /// Other algorithms ran this many frames since the last one of this.

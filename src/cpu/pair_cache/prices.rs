@@ -25,50 +25,77 @@ const FORGETTING: f32 = 512.0;
 
 /// Measured costs of a box in nanoseconds, over what the cost model says of the frame. The model's constants are those
 /// of another machine, but it knows how costs change with the scene.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Prices {
     /// Without a clock, the model alone decides.
     timed: bool,
-    /// Number of frames from scratch.
-    frames: u32,
-    /// Of the mean frame from scratch.
-    scratch: MeanTime,
+    /// By number of threads, and the one in use: a second thread that is slow to wake says nothing of the first.
+    widths: Vec<OfWidth>,
+    width: usize,
     /// Cost of keeping beyond that of frames from scratch, in such frames, since it was last below.
     lost: f32,
     /// What the model said of keeping and of finding from scratch when keeping began.
     promised: [f32; 2],
     /// Sum and number of the frames since, without the first, which builds.
     kept: [f32; 2],
+}
+
+/// What frames on one number of threads have shown.
+#[derive(Debug, Clone, Copy)]
+struct OfWidth {
+    /// Number of frames from scratch.
+    frames: u32,
+    /// Of the mean frame from scratch.
+    scratch: MeanTime,
     /// Measured cost of keeping over the promised one when it last failed.
     over: f32,
 }
 
+impl OfWidth {
+    fn failed_by(over: f32) -> Self {
+        Self { frames: 0, scratch: MeanTime::default(), over }
+    }
+}
+
 impl Prices {
-    pub(super) fn new(timed: bool) -> Self {
-        let scratch = MeanTime::default();
-        Self { timed, frames: 0, scratch, lost: 0.0, promised: [0.0; 2], kept: [0.0; 2], over: 1.0 }
+    /// For this many numbers of threads, of which the first is in use.
+    pub(super) fn new(timed: bool, widths: usize) -> Self {
+        let widths = vec![OfWidth::failed_by(1.0); widths];
+        Self { timed, widths, width: 0, lost: 0.0, promised: [0.0; 2], kept: [0.0; 2] }
+    }
+
+    /// Goes on with another number of threads.
+    pub(super) fn set_width(&mut self, width: usize) {
+        self.width = width;
+    }
+
+    fn now(&mut self) -> &mut OfWidth {
+        &mut self.widths[self.width]
     }
 
     /// Forgets what a box costs, and not how keeping and finding from scratch compare.
     pub(super) fn forget(&mut self) {
-        *self = Self { over: self.over, ..Self::new(self.timed) };
+        self.widths.iter_mut().for_each(|w| *w = OfWidth::failed_by(w.over));
+        (self.lost, self.promised, self.kept) = (0.0, [0.0; 2], [0.0; 2]);
     }
 
     /// Learns from a frame from scratch, of which the model says `model`.
     pub(super) fn add_scratch(&mut self, took: f32, model: f32) {
-        self.frames = self.frames.saturating_add(1);
-        let now = f64::from(took / model);
-        if self.frames > FEWEST_FRAMES {
-            self.scratch.add(now);
-        } else if self.frames >= FIRST_COUNTED {
-            self.scratch = MeanTime::of(self.scratch.get().map_or(now, |least| least.min(now)));
+        let of = self.now();
+        of.frames = of.frames.saturating_add(1);
+        let cost = f64::from(took / model);
+        if of.frames > FEWEST_FRAMES {
+            of.scratch.add(cost);
+        } else if of.frames >= FIRST_COUNTED {
+            of.scratch = MeanTime::of(of.scratch.get().map_or(cost, |least| least.min(cost)));
         }
     }
 
     /// Begins a try of keeping if it is worth one by what the model says, and returns whether. The clock ends a try
     /// that does not pay, whose measured cost counts, less and less, for the next ones.
     pub(super) fn begins(&mut self, keeping: f32, scratch: f32) -> bool {
-        let begins = self.over * keeping < scratch && (!self.timed || self.frames >= FEWEST_FRAMES);
+        let OfWidth { over, frames, .. } = *self.now();
+        let begins = over * keeping < scratch && (!self.timed || frames >= FEWEST_FRAMES);
         if begins {
             // The frame that builds is not counted.
             (self.lost, self.promised, self.kept) = (0.0, [keeping, scratch], [0.0, -1.0]);
@@ -79,11 +106,14 @@ impl Prices {
 
     /// Frames go by in which no pairs are kept.
     pub(super) fn fade(&mut self, frames: u64) {
-        self.over = 1.0 + (self.over - 1.0) * (-(frames as f32) / FORGETTING).exp();
+        let kept = (-(frames as f32) / FORGETTING).exp();
+        self.widths.iter_mut().for_each(|w| w.over = 1.0 + (w.over - 1.0) * kept);
     }
 
+    /// On the threads in use, or on others if no frame from scratch has run on these.
     fn of_scratch(&self) -> f32 {
-        self.scratch.get().unwrap_or(1.0) as f32
+        let mut known = self.widths[self.width..].iter().chain(&self.widths).filter_map(|w| w.scratch.get());
+        known.next().unwrap_or(1.0) as f32
     }
 
     /// Ends a try that did not pay, or that had too many pairs to keep. `model`: what the model says of keeping.
@@ -93,7 +123,7 @@ impl Prices {
             [sum, frames] if frames > 0.0 => sum / frames / self.of_scratch(),
             _ => model,
         };
-        self.over = (WARY * cost / self.promised[0]).max(1.0);
+        self.now().over = (WARY * cost / self.promised[0]).max(1.0);
     }
 
     /// Learns from a frame with kept pairs. `keeping` and `scratch`: what the model says. Returns whether to go on.
@@ -119,7 +149,7 @@ mod tests {
 
     #[test]
     fn keeping_is_tried_after_six_frames_and_stops_when_it_has_lost_four() {
-        let mut prices = Prices::new(true);
+        let mut prices = Prices::new(true, 1);
         for frame in 0..6 {
             assert!(!prices.begins(10.0, 40.0));
             // The tree is built, and one frame is interrupted.
@@ -141,7 +171,7 @@ mod tests {
 
     #[test]
     fn a_failure_counts_for_the_next_promises() {
-        let mut prices = Prices::new(true);
+        let mut prices = Prices::new(true, 1);
         (0..10).for_each(|_| prices.add_scratch(50.0, 40.0));
         assert!(prices.begins(30.0, 40.0));
         while prices.pays(60.0, 30.0, 40.0) {}
@@ -157,8 +187,23 @@ mod tests {
     }
 
     #[test]
+    fn a_failure_on_two_threads_does_not_count_on_one() {
+        let mut prices = Prices::new(true, 2);
+        prices.set_width(1);
+        (0..10).for_each(|_| prices.add_scratch(50.0, 40.0));
+        assert!(prices.begins(30.0, 40.0));
+        while prices.pays(90.0, 30.0, 40.0) {}
+        prices.failed(30.0, false);
+        assert!(!prices.begins(30.0, 40.0));
+        prices.set_width(0);
+        assert!(!prices.begins(30.0, 40.0), "no frame from scratch has run on one thread");
+        (0..6).for_each(|_| prices.add_scratch(50.0, 40.0));
+        assert!(prices.begins(30.0, 40.0));
+    }
+
+    #[test]
     fn without_a_clock_the_model_decides() {
-        let mut prices = Prices::new(false);
+        let mut prices = Prices::new(false, 1);
         assert!(prices.begins(39.0, 40.0) && !prices.begins(41.0, 40.0));
         assert!(prices.pays(1.0e9, 39.0, 40.0) && !prices.pays(0.0, 41.0, 40.0));
     }
