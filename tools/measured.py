@@ -1,8 +1,7 @@
 #!/usr/bin/env python3
-"""Stores what a benchmark measured, for `tools/results.sh`.
+"""Notes where and when a benchmark measured, for `tools/results.sh`.
 
-    tools/measured.py note FILE COMMAND SAMPLES    # where and when results/FILE was measured: here and now
-    tools/measured.py python OUTPUT                # the times that `tools/python.sh bench` printed
+    tools/measured.py FILE COMMAND SAMPLES    # where and when results/FILE was measured: here and now
 
 Needs Python 3.8 only.
 """
@@ -17,21 +16,6 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "results"
-
-
-def read_python(path):
-    """Keeps the medians of other libraries out of what `tools/python.sh bench` printed."""
-    lines = pathlib.Path(path).read_text(encoding="utf-8").splitlines()
-    objects, found = None, []
-    for line in lines:
-        head = re.match(r"(\d+) boxes of `uniform`", line)
-        entry = re.match(r"  (.+?): ([\d.]+) (ms|µs)", line)
-        objects = head[1] if head else objects
-        if entry and objects:
-            found.append([objects, entry[1], f"{float(entry[2]) / (1 if entry[3] == 'ms' else 1000):.3g}"])
-    assert found, f"{path} has no times"
-    with open(RESULTS / "python.csv", "w", newline="", encoding="utf-8") as file:
-        csv.writer(file, lineterminator="\n").writerows([["objects", "contestant", "median_ms"], *found])
 
 
 def note(name, command, samples):
@@ -52,4 +36,4 @@ def note(name, command, samples):
         out.writerows(sorted(known, key=lambda row: row["file"]))
 
 
-{"note": note, "python": read_python}[sys.argv[1]](*sys.argv[2:])
+note(*sys.argv[1:])

@@ -10,7 +10,7 @@ cd "$(dirname "$0")/.."
 folder=${CARGO_TARGET_DIR:-target}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-note() { tools/measured.py note "$1" "tools/results.sh $2" "$3"; }
+note() { tools/measured.py "$1" "tools/results.sh $2" "$3"; }
 host() {
   [ -n "${SAPWISE_HOST:-}" ] && return
   echo "results: name this machine's folder in datasets/ with SAPWISE_HOST" >&2
@@ -34,11 +34,7 @@ inline() {
   note inline.csv inline "n = 4 repeats of 600 frames"
 }
 c() { tools/c.sh bench; note c.csv c "medians over all frames"; }
-python() {
-  tools/python.sh bench | tee "$work/python.txt"
-  tools/measured.py python "$work/python.txt"
-  note python.csv python "n = 31 frames"
-}
+python() { tools/python.sh bench; note python.csv python "samples as in the file"; }
 avian() { tools/avian.sh bench; note avian.csv avian "medians over all steps"; }
 web() { tools/web.sh bench; note web.csv web "medians over all frames"; }
 # The regret of the built-in model on the reports of this machine. It means something if the model has not seen them.
