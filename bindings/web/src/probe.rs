@@ -206,7 +206,8 @@ impl Probe {
     /// GPU's. Rejects if the GPU refuses an algorithm; the probe can go on without it.
     #[wasm_bindgen(js_name = addGpu)]
     pub async fn add_gpu(&self, gpu: &WebGpu, name: String, parameters: JsValue) -> Result<(), JsError> {
-        let identity = GpuIdentity::new(0, name, gpu.0.identity().kind).with_driver("", "", "webgpu");
+        let mut identity = GpuIdentity::new(0, name, gpu.0.identity().kind);
+        "webgpu".clone_into(&mut identity.api);
         let mut added = Vec::new();
         for entry in entries() {
             added.push(AsyncBroadPhase::new(&gpu.0, entry.id.method()).await?);
