@@ -360,14 +360,20 @@ def python_sentence():
     return f"10 000 `uniform` boxes, medians: {named}. {caption('python.csv', '../')}\n"
 
 
+# Columns that the caption has, or that only the file has.
+NOT_SHOWN = (
+    "machine", "date", "frames", "steps", "samples", "avian3d", "bullet", "trees_p99_ms", "quartile_1_ms", "quartile_3_ms",
+)
+
+
 def small_pages():
     """A table of each small file that was measured."""
     for name in ("sizes", "builds", "memory", "c", "avian", "web"):
         if (RESULTS / f"{name}.csv").exists():
-            body = rows(f"{name}.csv")
+            kept = [{k: v for k, v in row.items() if k not in NOT_SHOWN} for row in rows(f"{name}.csv")]
             yield (
                 f"{name}.md",
-                f"# {name.capitalize()}\n\n{table(list(body[0]), [row.values() for row in body])}\n"
+                f"# {name.capitalize()}\n\n{table(list(kept[0]), [row.values() for row in kept])}\n"
                 f"{caption(f'{name}.csv', None)}\n",
             )
 
