@@ -2,10 +2,10 @@
 
 use crate::clock::milliseconds;
 use sapwise::algorithm::{Displacement, Entry, Load};
-use sapwise_tune::stats::median;
 use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Pairs, Registry};
 use sapwise_gpu::AsyncBroadPhase;
 use sapwise_scenes::{Random, Scenario};
+use sapwise_tune::stats::median;
 use serde_json::{Value, json};
 
 /// The scenarios: the usual one, one with many pairs, and one with boxes of all sizes.
