@@ -54,7 +54,8 @@ const UNMAPPED: u8 = 0;
 const ASKED: u8 = 1;
 const MAPPED: u8 = 2;
 
-const NOT_MAPPED: &str = "the driver refuses to map memory";
+/// A browser may say so before it reports that the device was lost.
+const NOT_MAPPED: &str = "the driver refuses to map memory; the device may be lost";
 
 /// Bytes that a worker copies at once.
 const COPIED: usize = 64 << 10;
