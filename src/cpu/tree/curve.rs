@@ -79,7 +79,8 @@ struct Class {
 impl Cells {
     /// Makes cells whose numbers have this many bits on each axis.
     fn new([x, y, z]: [f32; 3], bits: [u32; 3]) -> Self {
-        let [last_x, last_y, last_z] = bits.map(|b| ((1 << b) - 1) as f32);
+        // Numbers of cells are converted from `f32` to 32 bits with a sign; finer cells would tell nothing apart.
+        let [last_x, last_y, last_z] = bits.map(|b| ((1_u32 << b.min(30)) - 1) as f32);
         Self { density: [x, y, z, 0.0], last: [last_x, last_y, last_z, 0.0] }
     }
 }
