@@ -1,4 +1,4 @@
-//! Single calls: a prediction from the text of a model to the tuning, one decision, and what a filter and `Changes` cost
+//! Single calls: prediction from the text of a model to the tuning, one decision, and what a filter and `Changes` cost
 //! beside finding the pairs.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};

@@ -128,8 +128,8 @@ described! {
     /// use sapwise::Registry;
     ///
     /// let told = Registry::with_cores(2).create(&"sap@cpu4".parse().unwrap()).err();
-    /// let too_few = |why| matches!(why, Error::Unavailable { reason: Unavailable::TooFewCores { threads: 4, .. }, .. });
-    /// assert!(told.is_some_and(too_few));
+    /// use Unavailable::TooFewCores;
+    /// assert!(matches!(told, Some(Error::Unavailable { reason: TooFewCores { threads: 4, .. }, .. })));
     /// ```
     #[derive(Debug, Clone, PartialEq, Eq)]
     #[non_exhaustive]

@@ -1,5 +1,5 @@
-//! The regret of the policy on a thousand made-up machines, after a stall, drifting, beside another program and with the
-//! tuning of another machine. No clock is read.
+//! What the policy takes over the best single candidate on a thousand made-up machines: after a stall, drifting, beside
+//! another program and with the tuning of another machine. No clock is read.
 
 use super::super::policy::Policy;
 use super::learning::{Chance, Truth, run};
@@ -18,7 +18,8 @@ const CLASS_LN: f64 = 0.4;
 const MEASURED_LN: f64 = 0.05;
 const ANOTHER_LN: f64 = 0.3;
 
-/// The time within a range of frames over that of the best single candidate, less 1, as a mean over all seeds, with costs that differ from the prediction by `own_ln`.
+/// Returns the time within a range of frames over that of the best single candidate, less 1, as a mean over all seeds.
+/// `own_ln`: by how much costs differ from the prediction.
 /// `disturb` returns the factor on the cost of a candidate on some threads in a frame, from a number of the seed.
 fn mean_regret(range: Range<usize>, own_ln: f64, disturb: impl Fn(u32, usize, u64) -> f64 + Copy + 'static) -> f64 {
     let regrets = (0..SEEDS).map(|seed| {
