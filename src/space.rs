@@ -37,7 +37,7 @@ pub use body::Body;
 pub use handle::Handle;
 pub use view::View;
 
-/// Updates without being set after which a body may rest. Waking it costs about as much as that many updates of an
+/// Most updates that a body stays active without being set. Waking it costs about as much as that many updates of an
 /// active one.
 const IDLE: u64 = 8;
 
@@ -167,7 +167,7 @@ impl Space {
             tree: OnceLock::new(),
             links: Links::default(),
             // So that the first fixed bodies rest at once.
-            update: IDLE,
+            update: 0,
             rests: false,
             keys: Vec::new(),
             before: Vec::new(),

@@ -35,8 +35,8 @@ fn snapshot_has_this_form() {
         |groups, mask, fixed, owner| json!({ "groups": groups, "mask": mask, "fixed": fixed, "owner": owner });
     let body =
         |membership, kinematic, data| json!({ "membership": membership, "kinematic": kinematic, "user_data": data });
-    let held = |aabb: &Value, body, idle, previous: Value, removed| {
-        let stage = json!({ "active": idle });
+    let held = |aabb: &Value, body, patience: [u64; 2], previous: Value, removed| {
+        let stage = json!({ "active": patience });
         let held = json!({ "aabb": aabb, "body": body, "stage": stage, "previous": previous, "removed": removed });
         json!({ "generation": 1, "held": held })
     };
@@ -44,9 +44,9 @@ fn snapshot_has_this_form() {
     let handles = [1_u64 << 32 | 1, 2_u64 << 32 | 1];
     let form = json!({
         "slots": [
-            held(&aabb, body(membership(all, all, false, 0), false, 0), 0, aabb.clone(), true),
-            held(&now, body(membership(all, all, true, 0), false, 0), 8, aabb.clone(), false),
-            held(&aabb, body(membership(1, 2, true, 3), true, 4), 0, Value::Null, false),
+            held(&aabb, body(membership(all, all, false, 0), false, 0), [8, 8], aabb.clone(), true),
+            held(&now, body(membership(all, all, true, 0), false, 0), [0, 0], aabb.clone(), false),
+            held(&aabb, body(membership(1, 2, true, 3), true, 4), [8, 8], Value::Null, false),
         ],
         "free": [],
         "pairs": [[0, 1], [0, 2]],

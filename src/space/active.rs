@@ -1,17 +1,37 @@
 //! The bodies that were set lately, without gaps, as the algorithms want them.
 
+use super::IDLE;
 use super::body::Body;
 use crate::aabb::Aabb;
 use crate::filter::{Filter, Membership};
 use crate::pairs::Pairs;
+
+/// How long a body stays active if nobody sets it.
+///
+/// One that just woke may rest again in the next update. Each time it is set before, it waits twice as long. So a body
+/// that is set now and then is active for one update at a time, and one that is set in most updates never rests.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Patience {
+    /// The update from which on it may rest.
+    pub(super) until: u64,
+    /// The updates that it waited for when it was set last, up to [`IDLE`].
+    pub(super) wait: u64,
+}
+
+impl Patience {
+    /// Returns the patience of a body that was set in this update.
+    pub(super) fn after(update: u64, wait: u64) -> Self {
+        let wait = wait.min(IDLE);
+        Self { until: update + wait, wait }
+    }
+}
 
 /// See the module. Body `k` is element `k` of each list.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Active {
     pub(super) slots: Vec<u32>,
     pub(super) boxes: Vec<Aabb>,
-    /// The update that set the body last.
-    pub(super) set_in: Vec<u64>,
+    pub(super) patience: Vec<Patience>,
     /// Pairs of positions. The filter has the memberships, if there ever was one that is not the default.
     pub(super) pairs: Pairs,
 }
@@ -21,23 +41,24 @@ impl Active {
         self.slots.len()
     }
 
-    pub(super) fn push(&mut self, slot: u32, aabb: Aabb, body: &Body, update: u64) {
+    pub(super) fn push(&mut self, slot: u32, aabb: Aabb, body: &Body, patience: Patience) {
         self.set_body(self.slots.len(), body);
         self.slots.push(slot);
         self.boxes.push(aabb);
-        self.set_in.push(update);
+        self.patience.push(patience);
     }
 
     /// Puts another body in the place of one.
-    pub(super) fn replace(&mut self, at: usize, slot: u32, aabb: Aabb, body: &Body, update: u64) {
+    pub(super) fn replace(&mut self, at: usize, slot: u32, aabb: Aabb, body: &Body, patience: Patience) {
         self.slots[at] = slot;
+        self.boxes[at] = aabb;
+        self.patience[at] = patience;
         self.set_body(at, body);
-        self.set(at, aabb, update);
     }
 
     pub(super) fn set(&mut self, at: usize, aabb: Aabb, update: u64) {
         self.boxes[at] = aabb;
-        self.set_in[at] = update;
+        self.patience[at] = Patience::after(update, (2 * self.patience[at].wait).max(1));
     }
 
     /// Writes the membership of a body to the filter.
@@ -62,7 +83,7 @@ impl Active {
     pub(super) fn swap_remove(&mut self, at: usize) -> Option<u32> {
         self.slots.swap_remove(at);
         self.boxes.swap_remove(at);
-        self.set_in.swap_remove(at);
+        self.patience.swap_remove(at);
         if let Some(filter) = self.pairs.filter_mut() {
             filter.memberships.swap_remove(at);
         }

@@ -1,10 +1,14 @@
-//! The resting bodies near each active one, kept while that stays within its fat AABB.
+//! The resting bodies near each active one that it may meet, kept while it stays within its fat AABB.
 
 use super::resting::Resting;
 use crate::aabb::Aabb;
 
 /// Margin of a fat AABB, in mean edges of the body.
 const MARGIN: f32 = 0.25;
+
+/// Most bodies that may come to rest in an update without a search for each active body. Comparing with so many takes
+/// as long.
+const FEW: usize = 64;
 
 /// A resting body.
 #[derive(Debug, Clone, Copy)]
@@ -42,31 +46,52 @@ impl Neighbours {
         self.waste = 0;
     }
 
-    /// Calls `found` with the position of each active body and the slot of each resting one that overlaps it.
-    /// `boxes_at` are by slot. `found` may be called for bodies that have woken since, too.
+    /// Searches for the neighbours of the active body at this position anew: what it may meet has changed.
+    pub(super) fn forget(&mut self, at: usize) {
+        self.near.get_mut(at).into_iter().for_each(|near| near.epoch = 0);
+    }
+
+    /// Calls `found` with the position of each active body and the slot of each resting one that overlaps it and that
+    /// it `wants`. `boxes_at` are by slot.
     pub(super) fn each(
         &mut self,
         resting: &mut Resting,
         boxes_at: &[Aabb],
         (actives, boxes): (&[u32], &[Aabb]),
+        wants: impl Fn(usize, u32) -> bool,
         mut found: impl FnMut(usize, u32),
     ) {
         self.compact(actives);
         let Self { near, neighbours, waste } = self;
+        let epoch = resting.epoch();
+        let neighbour = |slot| Neighbour { aabb: boxes_at[slot as usize], slot };
+        let came = resting.arrived();
+        let arrived: Vec<Neighbour> = came.iter().take(FEW + 1).copied().map(neighbour).collect();
+        // Most slots are ruled out by a bit for each modulo 64.
+        let bits = came.iter().fold(0_u64, |bits, slot| bits | 1 << (slot % 64));
         for (at, (near, b)) in near.iter_mut().zip(boxes).enumerate() {
-            let stays = near.epoch == resting.epoch()
-                && (0..3).all(|a| near.fat.min[a] <= b.min[a] && b.max[a] <= near.fat.max[a]);
-            if !stays {
-                *waste += near.len as usize;
-                near.fat = fat(b);
-                near.first = neighbours.len();
-                let add = |slot| neighbours.push(Neighbour { aabb: boxes_at[slot as usize], slot });
-                resting.overlapping(&near.fat, add);
-                near.len = (neighbours.len() - near.first) as u32;
-                near.epoch = resting.epoch();
+            let stays = (0..3).all(|a| near.fat.min[a] <= b.min[a] && b.max[a] <= near.fat.max[a]);
+            if !stays || near.epoch != epoch {
+                let (known, first) = (near.first..near.first + near.len as usize, neighbours.len());
+                *waste += known.len();
+                if stays && near.epoch + 1 == epoch && arrived.len() <= FEW {
+                    // One that arrived may have been here before it woke.
+                    let came =
+                        |slot: u32| bits & 1 << (slot % 64) != 0 && resting.arrived().binary_search(&slot).is_ok();
+                    for k in known {
+                        neighbours.extend(Some(neighbours[k]).filter(|one| !came(one.slot)));
+                    }
+                    let near = arrived.iter().filter(|one| one.aabb.overlaps(&near.fat) && wants(at, one.slot));
+                    neighbours.extend(near);
+                } else {
+                    near.fat = fat(b);
+                    let mut add = |slot| neighbours.push(neighbour(slot));
+                    resting.overlapping(&near.fat, |slot| wants(at, slot).then(|| add(slot)).unwrap_or_default());
+                }
+                (near.first, near.len, near.epoch) = (first, (neighbours.len() - first) as u32, epoch);
             }
             let near = neighbours[near.first..][..near.len as usize].iter();
-            near.filter(|near| near.aabb.overlaps(b)).for_each(|near| found(at, near.slot));
+            near.filter(|one| one.aabb.overlaps(b) && resting.has(one.slot)).for_each(|one| found(at, one.slot));
         }
     }
 

@@ -19,11 +19,16 @@ pub(super) struct Resting {
     tree: GrownTree,
     /// Bodies that came since the last update.
     arrivals: Vec<u32>,
+    /// Those that came in the last update.
+    arrived: Vec<u32>,
+    /// Whether a body is among those of the last update: one bit for each slot.
+    bits: Vec<u64>,
     /// Number of bodies without the arrivals.
     len: usize,
     /// Whether they are all in the tree.
     is_built: bool,
-    /// Rises when bodies come to rest: what a query found then is no longer all.
+    /// Rises by 1 when bodies come to rest, by more when the bodies are others: what a query found before is no longer
+    /// all.
     epoch: u64,
     wear: Wear,
     members: Vec<u32>,
@@ -47,6 +52,17 @@ impl Resting {
         self.epoch
     }
 
+    /// Returns the bodies that came to rest when the epoch rose by 1.
+    pub(super) fn arrived(&self) -> &[u32] {
+        &self.arrived
+    }
+
+    /// Returns whether the body in a slot rests and did in the last update.
+    #[inline]
+    pub(super) fn has(&self, slot: u32) -> bool {
+        self.bits[slot as usize / 64] & 1 << (slot % 64) != 0
+    }
+
     /// Adds a body. [`update`](Self::update) follows before the next query.
     pub(super) fn add(&mut self, slot: u32) {
         self.arrivals.push(slot);
@@ -55,6 +71,7 @@ impl Resting {
     /// Removes a body that was there in the last update.
     pub(super) fn remove(&mut self, slot: u32) {
         self.len -= 1;
+        self.bits[slot as usize / 64] &= !(1 << (slot % 64));
         if self.is_built {
             self.tree.remove(slot);
         }
@@ -62,6 +79,8 @@ impl Resting {
 
     pub(super) fn clear(&mut self) {
         self.arrivals.clear();
+        self.epoch += 1;
+        self.bits.clear();
         (self.len, self.is_built) = (0, false);
     }
 
@@ -79,6 +98,7 @@ impl Resting {
     pub(super) fn update(&mut self, slots: &Slots) -> Result<(), Error> {
         let boxes = slots.boxes();
         let worn = self.wear.excess() > SORT_IN_NODES * self.len() as u64;
+        self.arrived.clear();
         if self.arrivals.is_empty() && !worn && self.is_built || self.len() == 0 {
             return Ok(());
         }
@@ -89,22 +109,23 @@ impl Resting {
         self.len += self.arrivals.len();
         // Ascending, so that the same bodies make the same tree.
         self.arrivals.sort_unstable();
-        let arrivals = std::mem::take(&mut self.arrivals);
+        std::mem::swap(&mut self.arrivals, &mut self.arrived);
+        let arrivals = &self.arrived;
         let is_built = std::mem::take(&mut self.is_built);
         let one = Workers::one();
         if many || worn || !is_built || self.tree.tree.is_sparse(self.len) {
             self.members.clear();
             self.members.extend(slots.resting());
+            mark(&mut self.bits, &self.members, boxes.len());
             let stats = SceneStats::of_members(boxes, &self.members);
             self.wear = Wear::default();
             self.tree.build(&one, boxes, Members::Of(&self.members), &stats, None)?;
         } else {
+            mark(&mut self.bits, arrivals, boxes.len());
             self.tree.update(&one, boxes, (arrivals.iter().copied(), 0), None, false)?;
             self.tree.refit(&one, boxes, std::iter::once(&arrivals[..]))?;
         }
         self.is_built = true;
-        self.arrivals = arrivals;
-        self.arrivals.clear();
         Ok(())
     }
 
@@ -112,4 +133,10 @@ impl Resting {
     pub(super) fn overlapping(&mut self, bounds: &Aabb, found: impl FnMut(u32)) {
         self.wear.note(1, self.tree.tree.overlapping(bounds, found).into(), FRESH);
     }
+}
+
+/// Sets the bits of these slots among so many.
+fn mark(bits: &mut Vec<u64>, of: &[u32], slots: usize) {
+    bits.resize(slots.div_ceil(64), 0);
+    of.iter().for_each(|slot| bits[*slot as usize / 64] |= 1 << (slot % 64));
 }

@@ -1,5 +1,6 @@
 //! The saved form of a space: its bodies, and the state that the next update compares with. Trees are rebuilt.
 
+use super::active::Patience;
 use super::body::Body;
 use super::handle::Handle;
 use super::slots::At;
@@ -47,8 +48,8 @@ struct Held {
 enum Stage {
     /// Inserted since.
     New,
-    /// Not set for this number of updates. Beyond [`IDLE`] the number makes no difference.
-    Active(u64),
+    /// May rest after so many more updates; the second number is [`Patience::wait`].
+    Active(u64, u64),
     Resting,
 }
 
@@ -63,8 +64,8 @@ impl Snapshot {
                 At::Free => return None,
                 At::New => (Stage::New, None),
                 At::Active(at) => {
-                    let idle = space.update - active.set_in[at as usize];
-                    (Stage::Active(idle.min(IDLE)), Some(active.boxes[at as usize]))
+                    let Patience { until, wait } = active.patience[at as usize];
+                    (Stage::Active(until.saturating_sub(space.update), wait), Some(active.boxes[at as usize]))
                 }
                 At::Resting => (Stage::Resting, Some(known)),
             };
@@ -90,7 +91,6 @@ impl Snapshot {
     /// Returns the space, or a description of the defect.
     fn restore(self) -> Result<Space, String> {
         let mut space = Space::new();
-        space.update = IDLE;
         space.reserve(self.slots.len()).map_err(|error| error.to_string())?;
         for slot in &self.slots {
             space.slots.push(slot.generation);
@@ -109,7 +109,10 @@ impl Snapshot {
             }
             match held.stage {
                 Stage::New => {}
-                Stage::Active(idle) => space.activate(slot, IDLE - idle.min(IDLE), None),
+                Stage::Active(until, wait) => {
+                    let [until, wait] = [until, wait].map(|updates| updates.min(IDLE));
+                    space.activate(slot, Patience { until, wait }, None);
+                }
                 Stage::Resting => space.slots.set_at(slot, At::Resting),
             }
         }

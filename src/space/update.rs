@@ -5,6 +5,7 @@ use crate::broad_phase::BroadPhase;
 use crate::changes::differences;
 use crate::cpu::Workers;
 use crate::error::Error;
+use crate::space::active::Patience;
 use crate::space::slots::{At, REMOVED, SET_BODY, Slots};
 
 /// Makes the key of a pair of slots, the lower one in the upper half.
@@ -55,7 +56,7 @@ impl Space {
     /// Lets bodies rest that were not set for some updates, if they are many.
     fn rest(&mut self) {
         let Self { active, slots, update, .. } = self;
-        let idle = |at: usize| active.set_in[at] + IDLE <= *update && !slots.is_changed(active.slots[at]);
+        let idle = |at: usize| active.patience[at].until <= *update && !slots.is_changed(active.slots[at]);
         let first = (0..active.len()).find(|&at| idle(at));
         let Some(first) = first else { return };
         if !self.rests {
@@ -98,6 +99,7 @@ impl Space {
                     self.active.set(at as usize, self.slots.boxes()[slot as usize], self.update);
                     if done & SET_BODY != 0 {
                         self.active.set_body(at as usize, self.slots.body(slot));
+                        self.neighbours.forget(at as usize);
                     }
                     continue;
                 }
@@ -109,8 +111,12 @@ impl Space {
             self.slots.set_at(slot, At::New);
             if !removed {
                 // One that was set may be set again soon.
-                let rests_at_once = at == At::New && self.slots.rests_at_once(slot);
-                newcomers.push((slot, if rests_at_once { self.update - IDLE } else { self.update }));
+                let wait = match at {
+                    At::New if self.slots.rests_at_once(slot) => 0,
+                    At::New => IDLE,
+                    _ => 1,
+                };
+                newcomers.push((slot, Patience::after(self.update, wait)));
             }
         }
         // Ascending, so that the order of the pairs that stay does not depend on the order of the changes.
@@ -118,19 +124,19 @@ impl Space {
         woken.into_iter().for_each(|slot| self.leave_resting(slot));
         left.sort_unstable();
         let mut places = left.iter().copied();
-        newcomers.into_iter().for_each(|(slot, set_in)| self.activate(slot, set_in, places.next()));
+        newcomers.into_iter().for_each(|(slot, patience)| self.activate(slot, patience, places.next()));
         // The highest first: then what takes the place of one never leaves itself.
         places.rev().for_each(|at| self.leave_active(at));
     }
 
     /// Adds a body to the active ones, at this place if there is one.
-    pub(super) fn activate(&mut self, slot: u32, set_in: u64, place: Option<u32>) {
+    pub(super) fn activate(&mut self, slot: u32, patience: Patience, place: Option<u32>) {
         let at = place.unwrap_or(self.active.len() as u32);
         self.slots.set_at(slot, At::Active(at));
         let (aabb, body) = (self.slots.boxes()[slot as usize], self.slots.body(slot));
         match place {
-            Some(at) => self.active.replace(at as usize, slot, aabb, body, set_in),
-            None => self.active.push(slot, aabb, body, set_in),
+            Some(at) => self.active.replace(at as usize, slot, aabb, body, patience),
+            None => self.active.push(slot, aabb, body, patience),
         }
     }
 
@@ -153,7 +159,7 @@ impl Space {
         self.rests = false;
         for slot in 0..self.slots.boxes().len() as u32 {
             if self.slots.at(slot) == At::Resting {
-                self.activate(slot, self.update, None);
+                self.activate(slot, Patience::after(self.update, IDLE), None);
             }
         }
         self.resting.clear();
@@ -171,14 +177,9 @@ impl Space {
         let of = &active.slots;
         keys.extend(active.pairs.iter().map(|&(a, b)| key(of[a as usize], of[b as usize])));
         if resting.len() > 0 {
-            neighbours.each(resting, slots.boxes(), (of, &active.boxes), |at, other| {
-                let one = of[at];
-                let meet = slots.at(other) == At::Resting
-                    && slots.body(one).membership().wants(slots.body(other).membership());
-                if meet {
-                    keys.push(key(one, other));
-                }
-            });
+            let wants = |at: usize, other| slots.body(of[at]).membership().wants(slots.body(other).membership());
+            let found = |at: usize, other| keys.push(key(of[at], other));
+            neighbours.each(resting, slots.boxes(), (of, &active.boxes), wants, found);
         }
         sorter.sort(&Workers::one(), keys);
         Ok(())
