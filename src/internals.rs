@@ -9,6 +9,7 @@ pub use crate::cpu::{Threads, Tree, Workers};
 pub use crate::gpu_identity::{GpuIdentity, GpuKind};
 pub use crate::load::{SampledBoxes, SceneStats, StripGrid};
 pub use crate::pair::Pair;
+pub use crate::pairs::FilterState;
 pub use crate::ray::{Ray, RayDefect};
 pub use crate::triad::triad;
 pub use crate::{splitmix, stats};

@@ -8,8 +8,8 @@ use crate::error::Error;
 use crate::filter::{Filter, Screen};
 use crate::pair::Pair;
 use crate::splitmix::mix;
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Weak};
 
 pub(crate) use fill::each_bit;
 pub(crate) use order::Sorter;
@@ -106,6 +106,13 @@ impl Pairs {
         self.filter.as_mut().map(|screen| Arc::make_mut(screen).filter_mut())
     }
 
+    /// Returns what tells whether the filter is another one in a later frame.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn filter_state(&self) -> FilterState {
+        FilterState(self.filter.as_ref().map_or_else(Weak::new, Arc::downgrade))
+    }
+
     /// Returns the filter and what methods derive from it.
     pub(crate) fn screen(&self) -> Option<&Screen> {
         self.filter.as_deref()
@@ -143,8 +150,8 @@ impl Pairs {
     /// Returns the number of pairs that the search of the last frame found: the wanted ones, and those that only the
     /// filter dropped.
     ///
-    /// Without a filter this is [`len`](Self::len). With one it depends on the algorithm: `brute`, `sap`, `grid-sap`
-    /// and GPUs find unwanted pairs that `bvh` and `pair-cache` rule out earlier.
+    /// Without a filter this is [`len`](Self::len). With one it depends on the algorithm: `brute`, `sap` and `grid-sap`
+    /// find unwanted pairs that `bvh` and `pair-cache` rule out earlier. GPUs do not count them.
     #[must_use]
     pub fn overlapping(&self) -> u64 {
         self.len as u64 + self.unwanted
@@ -231,6 +238,17 @@ impl Pairs {
     }
 }
 
+/// A filter, or none, at one time. Equal ones had the same memberships: a change of a filter that has a state moves it
+/// to another place in memory.
+#[derive(Debug, Clone, Default)]
+pub struct FilterState(Weak<Screen>);
+
+impl PartialEq for FilterState {
+    fn eq(&self, other: &Self) -> bool {
+        self.0.ptr_eq(&other.0)
+    }
+}
+
 impl<'a> IntoIterator for &'a Pairs {
     type Item = &'a Pair;
     type IntoIter = std::slice::Iter<'a, Pair>;
@@ -258,6 +276,22 @@ mod tests {
         assert_eq!(canonical.as_slice(), [(0, 9), (1, 2), (3, 7)]);
         assert_eq!(any.fingerprint(), canonical.fingerprint());
         assert_ne!(any.fingerprint(), filled(PairOrder::Any, &[(7, 3), (1, 2), (0, 8)]).fingerprint());
+    }
+
+    #[test]
+    fn each_change_of_a_filter_is_a_new_state() {
+        let mut list = Pairs::new();
+        assert_eq!(list.filter_state(), FilterState::default());
+        list.set_filter(Some(Filter::default()));
+        for _ in 0..3 {
+            let state = list.filter_state();
+            assert!(state != FilterState::default() && list.clone().filter_state() == state);
+            list.clear();
+            assert_eq!(list.filter_state(), state);
+            list.filter_mut().unwrap().memberships.clear();
+            list.clear();
+            assert_ne!(list.filter_state(), state);
+        }
     }
 
     #[test]

@@ -135,10 +135,10 @@ impl Pairs {
         self.refused.is_some() || self.limit.is_some_and(|limit| self.len >= limit)
     }
 
-    /// Appends the wanted ones of pairs that stand lower member first.
+    /// Appends the wanted ones of pairs that stand lower member first. `tested`: all are wanted.
     #[doc(hidden)]
-    pub fn extend(&mut self, pairs: &[[u32; 2]], threads: &Workers) -> Result<(), Error> {
-        if self.filter.is_none() {
+    pub fn extend(&mut self, pairs: &[[u32; 2]], threads: &Workers, tested: bool) -> Result<(), Error> {
+        if tested || self.filter.is_none() {
             self.reserve(self.len + pairs.len())?;
             if let Some(room) = self.room(pairs.len()) {
                 threads.each_of(room.chunks_mut(COPIED_TOGETHER).zip(pairs.chunks(COPIED_TOGETHER)), |(to, pairs)| {
@@ -183,10 +183,10 @@ impl Pairs {
         }
     }
 
-    /// Returns whether `more` pairs are surely too many: false if there is a filter, which may drop them.
+    /// Returns whether `more` pairs are surely too many. Pairs that were not `tested` may be dropped by a filter.
     #[doc(hidden)]
-    pub fn is_too_small_for(&self, more: u64) -> bool {
-        self.filter.is_none() && self.limit.is_some_and(|limit| self.len as u64 + more > limit as u64)
+    pub fn is_too_small_for(&self, more: u64, tested: bool) -> bool {
+        (tested || self.filter.is_none()) && self.limit.is_some_and(|limit| self.len as u64 + more > limit as u64)
     }
 
     /// Begins a list that takes a part of the pairs of `whole`, under the same limit and filter. All parts share

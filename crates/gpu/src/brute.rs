@@ -1,9 +1,10 @@
 //! Every box against every other; see `shaders/brute.wgsl`.
 
 use super::device::Gpu;
-use super::kernel::{Bound, Kernel, source};
+use super::kernel::source;
 use super::look::Look;
 use super::output::Output;
+use super::pairing::Pairing;
 use super::params::Params;
 use super::search::{Inputs, Search};
 use sapwise::error::GpuError;
@@ -14,18 +15,12 @@ const TILE: u32 = 128;
 /// The method on one GPU. Its blocks are pairs of tiles.
 #[derive(Debug)]
 pub(super) struct Brute {
-    count: Kernel,
-    write: Kernel,
-    bound: Option<[Bound; 2]>,
+    pairing: Pairing,
 }
 
 impl Brute {
     pub(super) fn new(gpu: &Gpu) -> Result<Self, GpuError> {
-        Ok(Self {
-            count: Kernel::new(gpu, source::BRUTE, "count")?,
-            write: Kernel::new(gpu, source::BRUTE, "write")?,
-            bound: None,
-        })
+        Ok(Self { pairing: Pairing::new(gpu, source::BRUTE)? })
     }
 }
 
@@ -54,22 +49,10 @@ impl Search for Brute {
     }
 
     fn bind(&mut self, gpu: &Gpu, inputs: &Inputs<'_>, output: &Output) -> Result<(), GpuError> {
-        let common = [(0, inputs.params), (1, inputs.boxes), (2, inputs.ids)];
-        let count = [common.as_slice(), &[(3, inputs.header), (4, output.sums())]].concat();
-        let write = [common.as_slice(), &[(4, output.sums()), (5, output.pairs())]].concat();
-        self.bound = Some([self.count.bind(gpu, &count)?, self.write.bind(gpu, &write)?]);
-        Ok(())
+        self.pairing.bind(gpu, inputs, output, &[(1, inputs.boxes), (2, inputs.ids)])
     }
 
-    fn record_count(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
-        if let Some([count, _]) = &self.bound {
-            count.dispatch(pass, params.blocks);
-        }
-    }
-
-    fn record_write(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
-        if let Some([_, write]) = &self.bound {
-            write.dispatch(pass, params.blocks);
-        }
+    fn pairing(&self) -> &Pairing {
+        &self.pairing
     }
 }

@@ -15,6 +15,7 @@ use super::brute::Brute;
 use super::device::Gpu;
 use super::failure::Failure;
 use super::look::Look;
+use super::memberships::Memberships;
 use super::output::{Output, PAIR};
 use super::params::{Header, Params};
 use super::sampler::{self, Sampler};
@@ -27,8 +28,8 @@ use super::watch::Place;
 use bytemuck::{bytes_of, cast_slice};
 use sapwise::algorithm::FramePlan;
 use sapwise::error::{GpuError, GpuErrorKind};
-use sapwise::internals::{SampledBoxes, Workers};
-use sapwise::{Aabb, Pairs};
+use sapwise::internals::{FilterState, SampledBoxes, Workers};
+use sapwise::{Aabb, Filter, Pairs};
 use std::sync::OnceLock;
 
 /// Bytes of a box.
@@ -56,6 +57,9 @@ pub(super) struct Engine {
     header: Storage,
     boxes: Storage,
     ids: Storage,
+    memberships: Memberships,
+    /// The filter of the last list of pairs.
+    filter: FilterState,
     upload: Transfer,
     download: Transfer,
     /// The buffer of boxes that the kernels are bound to; `None` if they must be bound again.
@@ -126,6 +130,8 @@ impl Engine {
             header: Storage::with_usage(&gpu, "header", usage)?,
             boxes: Storage::new(&gpu, "boxes")?,
             ids: Storage::new(&gpu, "numbers of boxes")?,
+            memberships: Memberships::new(&gpu)?,
+            filter: FilterState::default(),
             upload: Transfer::upload(&gpu)?,
             download: Transfer::download(&gpu)?,
             gpu,
@@ -161,6 +167,31 @@ impl Engine {
     /// Returns the parameters of a frame; see [`Search::plan`].
     pub(super) fn plan(&self, objects: u32, look: impl Fn() -> Look) -> Params {
         self.search.plan(objects, &look)
+    }
+
+    /// Sets the filter of the next frames, or lifts it.
+    ///
+    /// # Errors
+    /// It does not fit into a buffer, or the GPU refuses memory; then no filter is set.
+    pub(super) fn set_filter(&mut self, filter: Option<&Filter>) -> Result<(), GpuError> {
+        let bound_to = self.bound_to.take();
+        if !self.memberships.set(&self.gpu, filter)? {
+            self.bound_to = bound_to;
+        }
+        Ok(())
+    }
+
+    /// Takes over the filter of `pairs` if it has changed. One that does not fit into a buffer is left to the host.
+    pub(super) fn filter_for(&mut self, pairs: &Pairs) -> Result<(), GpuError> {
+        let state = pairs.filter_state();
+        if self.filter != state {
+            self.filter = FilterState::default();
+            match self.set_filter(pairs.filter()) {
+                Err(error) if error.kind() != GpuErrorKind::Limit => return Err(error),
+                _ => self.filter = state,
+            }
+        }
+        Ok(())
     }
 
     /// Makes room for a frame, and binds the kernels again if a buffer was replaced. `external` has the boxes that
@@ -213,8 +244,13 @@ impl Engine {
 
     fn bind(&mut self, boxes: &wgpu::Buffer) -> Result<(), GpuError> {
         self.bound_to = None;
-        let inputs =
-            Inputs { params: self.params.buffer(), boxes, ids: self.ids.buffer(), header: self.header.buffer() };
+        let inputs = Inputs {
+            params: self.params.buffer(),
+            boxes,
+            ids: self.ids.buffer(),
+            header: self.header.buffer(),
+            memberships: self.memberships.buffer(),
+        };
         self.output.bind(&self.gpu, inputs.params, inputs.header)?;
         if let Home::Device(sampler) = &mut self.home {
             sampler.bind(&self.gpu, inputs.params, boxes)?;
@@ -251,6 +287,7 @@ impl Engine {
         pairs: &mut Pairs,
         workers: &Workers,
     ) -> Result<(), Failure> {
+        self.filter_for(pairs)?;
         let look = || Look::of(&SampledBoxes::from(boxes), plan.stats(boxes));
         self.start(boxes, None, |engine| engine.plan(boxes.len() as u32, look), workers).await?;
         self.finish(pairs, workers).await
@@ -327,6 +364,7 @@ impl Engine {
     fn number(&mut self, params: &mut Params) -> u64 {
         params.blocks = self.first_blocks(params.objects);
         params.capacity = self.output.capacity();
+        params.members = self.memberships.count().unwrap_or(0);
         params.submission = self.next_submission();
         self.search.blocks(params.objects) - u64::from(params.blocks)
     }
@@ -354,10 +392,10 @@ impl Engine {
             self.search.record_sort(&mut pass, params);
         }
         if first != Step::Write {
-            self.search.record_count(&mut pass, params);
+            self.search.pairing().record_count(&mut pass, params.blocks);
             self.output.record(&mut pass);
         }
-        self.search.record_write(&mut pass, params);
+        self.search.pairing().record_write(&mut pass, params.blocks);
     }
 
     /// Submits, and downloads the header with `pairs` pairs or with a sample of the boxes.

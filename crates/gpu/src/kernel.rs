@@ -30,6 +30,7 @@ pub(crate) mod source {
     const INPUT: &str = include_str!("shaders/input.wgsl");
     const PREFIX: &str = include_str!("shaders/prefix.wgsl");
     const ROWS: &str = include_str!("shaders/rows.wgsl");
+    const BY_ROWS: [&str; 2] = [include_str!("shaders/count_rows.wgsl"), include_str!("shaders/write_rows.wgsl")];
 
     const CURVE: &str = include_str!("shaders/curve.wgsl");
     const DIVISION: &str = include_str!("shaders/division.wgsl");
@@ -37,17 +38,31 @@ pub(crate) mod source {
     const LEVELS: &str = include_str!("shaders/levels.wgsl");
     const WALK: &str = include_str!("shaders/walk.wgsl");
 
-    pub(crate) const BRUTE: Source = &[COMMON, INPUT, PREFIX, include_str!("shaders/brute.wgsl")];
     pub(crate) const KEYS: Source = &[COMMON, INPUT, DIVISION, CURVE, include_str!("shaders/keys.wgsl"), DIGITS];
     pub(crate) const CELLS: Source = &[COMMON, PREFIX, include_str!("shaders/cells.wgsl")];
     pub(crate) const GATHER: Source = &[COMMON, INPUT, include_str!("shaders/gather.wgsl")];
     pub(crate) const SAMPLE: Source = &[COMMON, INPUT, include_str!("shaders/sample.wgsl")];
     pub(crate) const SCAN: Source = &[COMMON, include_str!("shaders/scan.wgsl")];
     pub(crate) const SORT: Source = &[COMMON, PREFIX, include_str!("shaders/sort.wgsl"), DIGITS];
-    pub(crate) const GRID_SAP: Source = &[COMMON, PREFIX, ROWS, LEVELS, WALK, include_str!("shaders/grid_sap.wgsl")];
-    pub(crate) const BVH: Source = &[COMMON, ROWS, LEVELS, include_str!("shaders/bvh.wgsl")];
-    pub(crate) const SAP: Source = &[COMMON, PREFIX, ROWS, include_str!("shaders/sap.wgsl")];
     pub(crate) const TREE: Source = &[COMMON, LEVELS, include_str!("shaders/tree.wgsl")];
+
+    /// What the kernels that count and write pairs share, and the rest of each.
+    pub(crate) type Pairing = (Source, [&'static str; 2]);
+
+    pub(crate) const BRUTE: Pairing = (&[COMMON, INPUT, PREFIX], [include_str!("shaders/brute.wgsl"); 2]);
+    pub(crate) const GRID_SAP: Pairing =
+        (&[COMMON, PREFIX, ROWS, LEVELS, WALK, include_str!("shaders/grid_sap.wgsl")], BY_ROWS);
+    pub(crate) const BVH: Pairing = (&[COMMON, ROWS, LEVELS, include_str!("shaders/bvh.wgsl")], BY_ROWS);
+    pub(crate) const SAP: Pairing = (&[COMMON, PREFIX, ROWS, include_str!("shaders/sap.wgsl")], BY_ROWS);
+
+    /// Defines which pairs pass: all of them, or those that a filter wants.
+    pub(crate) const UNFILTERED: &str = include_str!("shaders/unfiltered.wgsl");
+    pub(crate) const FILTER: &str = include_str!("shaders/filter.wgsl");
+
+    /// Returns the files of the kernel that counts pairs, and of the one that writes them.
+    pub(crate) fn pairing((shared, each): Pairing, filter: &'static str) -> [Vec<&'static str>; 2] {
+        each.map(|own| [shared, &[filter, own]].concat())
+    }
 }
 
 impl Kernel {
@@ -55,7 +70,7 @@ impl Kernel {
     ///
     /// # Errors
     /// The compiler's error is the source.
-    pub(super) fn new(gpu: &Gpu, source: source::Source, entry: &'static str) -> Result<Self, GpuError> {
+    pub(super) fn new(gpu: &Gpu, source: &[&str], entry: &'static str) -> Result<Self, GpuError> {
         let checks = wgpu::ShaderRuntimeChecks {
             bounds_checks: false,
             force_loop_bounding: false,
@@ -187,22 +202,29 @@ mod tests {
     /// Parses and validates every shader without a driver.
     #[test]
     fn every_shader_is_valid() {
-        let sources = [
-            ("brute", BRUTE),
+        let mut sources: Vec<(String, Vec<&str>)> = [
             ("keys", KEYS),
             ("sample", SAMPLE),
             ("scan", SCAN),
             ("sort", SORT),
-            ("grid_sap", GRID_SAP),
-            ("sap", SAP),
             ("cells", CELLS),
             ("gather", GATHER),
             ("tree", TREE),
-            ("bvh", BVH),
-        ];
+        ]
+        .map(|(name, source)| (name.to_owned(), source.to_vec()))
+        .to_vec();
+        for (name, texts) in [("brute", BRUTE), ("sap", SAP), ("grid_sap", GRID_SAP), ("bvh", BVH)] {
+            for (filter, text) in [("", UNFILTERED), ("_filter", FILTER)] {
+                let [count, write] = pairing(texts, text);
+                if count != write {
+                    sources.push((format!("{name}{filter}_write"), write));
+                }
+                sources.push((format!("{name}{filter}"), count));
+            }
+        }
         for (name, source) in sources {
             // `tools/shaders` reads from the first line how wgpu compiles the text.
-            assert_valid(name, &format!("// Without checks.\n{}", source.concat()));
+            assert_valid(&name, &format!("// Without checks.\n{}", source.concat()));
         }
     }
 

@@ -30,7 +30,8 @@ pub(super) struct Params {
     pub(super) usual: f32,
     pub(super) passes: u32,
     pub(super) curve_bits: u32,
-    pub(super) unused: [u32; 3],
+    pub(super) members: u32,
+    pub(super) unused: [u32; 2],
     pub(super) curve: [[Segment; PARTS]; 3],
     pub(super) grid: [[Segment; PARTS]; 3],
 }

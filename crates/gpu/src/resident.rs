@@ -8,7 +8,7 @@ use super::params::Params;
 use sapwise::algorithm::Backend;
 use sapwise::error::{BoxDefect, ParseIdError};
 use sapwise::internals::SampledBoxes;
-use sapwise::{Aabb, AlgorithmId, Error};
+use sapwise::{Aabb, AlgorithmId, Error, Filter};
 
 /// Finds the pairs of boxes in the memory of a GPU and leaves them there, for engines whose data never leave it.
 ///
@@ -116,6 +116,15 @@ impl Resident {
     pub fn submit(&mut self, boxes: &wgpu::Buffer, objects: u32) -> Result<SubmittedPairs<'_>, Error> {
         self.run_ahead(boxes, objects).map_err(|failure| failure.of(&self.id))?;
         Ok(SubmittedPairs { pairs: self.engine.pairs_buffer(), counts: self.engine.header_buffer() })
+    }
+
+    /// Sets the filter of the next frames, or lifts it. Uploads 16 bytes for each membership.
+    ///
+    /// # Errors
+    /// [`Error::Unavailable`] if the memberships don't fit into the largest buffer of the GPU, or it refuses memory;
+    /// then no filter is set.
+    pub fn set_filter(&mut self, filter: Option<&Filter>) -> Result<(), Error> {
+        self.engine.set_filter(filter).map_err(|error| unavailable(&self.id, error))
     }
 
     /// Returns the last frame that had arrived when a frame was last [submitted](Self::submit): usually the previous

@@ -3,6 +3,7 @@
 use super::Gpu;
 use super::look::Look;
 use super::output::Output;
+use super::pairing::Pairing;
 use super::params::Params;
 use sapwise::error::GpuError;
 use std::fmt::Debug;
@@ -47,11 +48,8 @@ pub(super) trait Search: Debug + Send + Sync {
         let _ = (pass, params);
     }
 
-    /// Counts the pairs of each block.
-    fn record_count(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params);
-
-    /// Writes the pairs of the window to their positions.
-    fn record_write(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params);
+    /// Returns the kernels that count and write the pairs.
+    fn pairing(&self) -> &Pairing;
 }
 
 /// The buffers that every method reads.
@@ -61,4 +59,6 @@ pub(super) struct Inputs<'a> {
     pub(super) boxes: &'a wgpu::Buffer,
     pub(super) ids: &'a wgpu::Buffer,
     pub(super) header: &'a wgpu::Buffer,
+    /// `None` if there is no filter.
+    pub(super) memberships: Option<&'a wgpu::Buffer>,
 }

@@ -65,6 +65,10 @@ impl Share {
         if self.full || self.failure.is_some() || self.members.boxes.is_empty() {
             return;
         }
+        if let Err(error) = self.engine.filter_for(&self.pairs) {
+            self.failure = Some(Failure::Gpu(error));
+            return;
+        }
         let Members { boxes, ids } = &self.members;
         self.work += (boxes.len() as f64).powf(self.engine.growth());
         let look = || Look::at(&SampledBoxes::from(boxes.as_slice()));

@@ -5,6 +5,7 @@ use super::device::Gpu;
 use super::kernel::{Bound, Kernel, source};
 use super::look::Look;
 use super::output::Output;
+use super::pairing::Pairing;
 use super::params::Params;
 use super::search::{Inputs, Search};
 use super::sort::Sort;
@@ -52,13 +53,12 @@ pub(super) struct Sorted {
     make_keys: Kernel,
     gather: Kernel,
     tree: Option<Tree>,
-    count: Kernel,
-    write: Kernel,
+    pairing: Pairing,
     /// The sorted boxes, then the levels of the tree.
     boxes: Storage,
     rows: Storage,
     kept: Storage,
-    bound: Option<[Bound; 3]>,
+    bound: Option<Bound>,
     /// One for each buffer that may have the order.
     gathers: Vec<Bound>,
 }
@@ -89,8 +89,7 @@ impl Sorted {
                 Kind::Sap => None,
                 Kind::GridSap | Kind::Bvh => Some(Tree::new(gpu, kind == Kind::GridSap)?),
             },
-            count: Kernel::new(gpu, rows, "count")?,
-            write: Kernel::new(gpu, rows, "write")?,
+            pairing: Pairing::new(gpu, rows)?,
             boxes: Storage::new(gpu, "sorted boxes")?,
             rows: Storage::new(gpu, "rows")?,
             kept: Storage::new(gpu, "kept pairs")?,
@@ -135,19 +134,12 @@ impl Search for Sorted {
     }
 
     fn bind(&mut self, gpu: &Gpu, inputs: &Inputs<'_>, output: &Output) -> Result<(), GpuError> {
-        let Inputs { params, boxes, ids, header } = *inputs;
+        let Inputs { params, boxes, ids, header, .. } = *inputs;
         let sorted = self.boxes.buffer();
         let mut make_keys = vec![(0, params), (1, boxes), (2, ids), (3, header)];
         let mut gather = vec![(0, params), (1, boxes), (2, ids), (5, sorted)];
         let orders;
-        let mut rows = vec![
-            (0, params),
-            (2, sorted),
-            (4, output.sums()),
-            (5, output.pairs()),
-            (6, self.rows.buffer()),
-            (7, self.kept.buffer()),
-        ];
+        let mut rows = vec![(2, sorted), (6, self.rows.buffer()), (7, self.kept.buffer())];
         let mut table = None;
         match &mut self.order {
             Order::Radix(sort) => {
@@ -169,11 +161,10 @@ impl Search for Sorted {
         if let Some(tree) = &mut self.tree {
             tree.bind(gpu, params, sorted, table)?;
         }
-        let write = self.write.bind(gpu, &rows)?;
-        rows.push((3, header));
+        self.pairing.bind(gpu, inputs, output, &rows)?;
         let gather_from = |order| self.gather.bind(gpu, &[gather.as_slice(), &[(4, order)]].concat());
         self.gathers = orders.into_iter().map(gather_from).collect::<Result<_, _>>()?;
-        self.bound = Some([self.make_keys.bind(gpu, &make_keys)?, self.count.bind(gpu, &rows)?, write]);
+        self.bound = Some(self.make_keys.bind(gpu, &make_keys)?);
         Ok(())
     }
 
@@ -185,7 +176,7 @@ impl Search for Sorted {
     }
 
     fn record_sort(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
-        let Some([make_keys, ..]) = &self.bound else { return };
+        let Some(make_keys) = &self.bound else { return };
         let groups = params.objects.div_ceil(BOXES);
         make_keys.dispatch(pass, groups);
         match &self.order {
@@ -199,15 +190,7 @@ impl Search for Sorted {
         }
     }
 
-    fn record_count(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
-        if let Some([.., count, _]) = &self.bound {
-            count.dispatch(pass, params.blocks);
-        }
-    }
-
-    fn record_write(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
-        if let Some([.., write]) = &self.bound {
-            write.dispatch(pass, params.blocks);
-        }
+    fn pairing(&self) -> &Pairing {
+        &self.pairing
     }
 }

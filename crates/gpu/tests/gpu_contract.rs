@@ -124,7 +124,6 @@ fn the_limit_counts_the_pairs_that_pass_the_filter() {
         // The last five have no membership.
         let memberships: Vec<Membership> = (0..boxes.len() - 5).map(|_| random.membership()).collect();
         let expected = naive_filtered(&boxes, &memberships);
-        let all = naive(&boxes).len();
         let limit = expected.len() - 1;
         for (id, mut algorithm) in every_algorithm(&gpus) {
             let mut pairs = Pairs::with_order(PairOrder::Canonical);
@@ -132,9 +131,61 @@ fn the_limit_counts_the_pairs_that_pass_the_filter() {
             pairs.set_limit(Some(expected.len()));
             algorithm.find_pairs(&boxes, &mut pairs).unwrap_or_else(|e| panic!("{id}: {e}"));
             assert!(pairs.as_slice() == expected, "{id}: {} pairs, not {}", pairs.len(), expected.len());
-            assert_eq!(pairs.overlapping(), all as u64, "{id}");
+            assert_eq!(pairs.overlapping(), expected.len() as u64, "{id}");
             pairs.set_limit(Some(limit));
             assert_eq!(algorithm.find_pairs(&boxes, &mut pairs), Err(Error::TooManyPairs { limit }), "{id}");
+        }
+    }
+}
+
+#[test]
+fn filters_change_between_frames() {
+    let Some(gpus) = gpus() else { return };
+    let mut random = Random(14);
+    let mut algorithms = every_algorithm(&gpus);
+    let mut pairs = Pairs::with_order(PairOrder::Canonical);
+    for frame in 0..9 {
+        // Frame 3 has fewer boxes than memberships; in frames 5 and 6 there is no filter, or none that tests anything.
+        let boxes = random.cubes([900, 900, 1700, 500][frame % 4], [9.0, 12.0, 9.0], 0.7);
+        match frame {
+            0 | 7 => pairs.set_filter(Some(Filter::new((0..700).map(|_| random.membership()).collect()))),
+            5 => pairs.set_filter(None),
+            6 => pairs.set_filter(Some(Filter::default())),
+            // Two frames have one filter.
+            1 | 8 => {}
+            _ => {
+                let memberships = &mut pairs.filter_mut().unwrap().memberships;
+                memberships.push(random.membership());
+                (0..50).for_each(|k| memberships[k * 13 + frame] = random.membership());
+            }
+        }
+        let expected = naive_filtered(&boxes, pairs.filter().map_or(&[], |filter| &filter.memberships));
+        for (id, algorithm) in &mut algorithms {
+            algorithm.find_pairs(&boxes, &mut pairs).unwrap_or_else(|e| panic!("{id} in frame {frame}: {e}"));
+            assert!(pairs.as_slice() == expected, "{id} in frame {frame}: {} pairs", pairs.len());
+        }
+    }
+}
+
+/// Four million pairs overlap, or ten with `long-tests`. Ten are wanted, and a limit allows no more.
+#[test]
+fn few_of_millions_of_pairs_are_wanted() {
+    let Some(gpus) = gpus() else { return };
+    let objects = if cfg!(feature = "long-tests") { 4500 } else { 2900 };
+    let boxes: Vec<Aabb> = (0..objects).map(|k| Aabb::cube([k as f32 * 1e-4, 0.0, 0.0], 1.0)).collect();
+    let of = |groups, mask| Membership { groups, mask, ..Membership::ALL };
+    let mut memberships = vec![of(1, 2); objects];
+    (0..10).for_each(|k| memberships[k * 277 + 5] = of(4, 8));
+    memberships[1234] = of(8, 4);
+    let expected = naive_filtered(&boxes, &memberships);
+    assert_eq!(expected.len(), 10);
+    for (id, mut algorithm) in every_algorithm(&gpus) {
+        let mut pairs = Pairs::with_order(PairOrder::Canonical);
+        pairs.set_filter(Some(Filter::new(memberships.clone())));
+        for (limit, result) in [(10, Ok(())), (9, Err(Error::TooManyPairs { limit: 9 }))] {
+            pairs.set_limit(Some(limit));
+            assert_eq!(algorithm.find_pairs(&boxes, &mut pairs), result, "{id}");
+            assert!(result.is_err() || pairs.as_slice() == expected, "{id}: {} pairs", pairs.len());
         }
     }
 }

@@ -3,10 +3,10 @@
 mod common;
 
 use common::gpu::{upload, words};
-use common::{Random, gpus, naive};
+use common::{Random, gpus, naive, naive_filtered};
 use sapwise::error::BoxDefect;
 use sapwise::internals::Pair;
-use sapwise::{Aabb, Error};
+use sapwise::{Aabb, Error, Filter, Membership};
 use sapwise_gpu::{Gpu, Resident, wgpu30 as wgpu};
 
 const METHODS: [&str; 4] = ["brute", "sap", "grid-sap", "bvh"];
@@ -42,6 +42,32 @@ fn resident_frames_equal_the_oracle() {
             }
             let dense = buffer(&gpu, &[Aabb::cube([1.0; 3], 1.0); 600]);
             assert_eq!(resident.find_pairs(&dense, 600).unwrap().count, 600 * 599 / 2, "{method}: the list grows");
+        }
+    }
+}
+
+#[test]
+fn resident_frames_are_filtered() {
+    let Some(gpus) = gpus() else { return };
+    let mut random = Random(23);
+    let boxes = random.cubes(900, [9.0, 12.0, 9.0], 0.8);
+    let memberships: Vec<Membership> = (0..850).map(|_| random.membership()).collect();
+    for index in 0..gpus.len() as u32 {
+        let gpu = gpus.open(index).unwrap();
+        let on_gpu = buffer(&gpu, &boxes);
+        for method in METHODS {
+            let mut resident = Resident::new(&gpu, method).unwrap();
+            for memberships in [&memberships[..], &[], &memberships[..300]] {
+                let filter = Filter::new(memberships.to_vec());
+                resident.set_filter((!memberships.is_empty()).then_some(&filter)).unwrap();
+                let expected = naive_filtered(&boxes, memberships);
+                let pairs = resident.find_pairs(&on_gpu, 900).unwrap();
+                assert!(download(&gpu, pairs.buffer, pairs.count) == expected, "{method} on gpu{index}");
+                let submitted = resident.submit(&on_gpu, 900).unwrap();
+                let counts = words(&gpu, submitted.counts, 9);
+                assert_eq!(counts[0] as usize, expected.len(), "{method} on gpu{index}");
+                assert!(download(&gpu, submitted.pairs, counts[0]) == expected, "{method} on gpu{index}, submitted");
+            }
         }
     }
 }

@@ -24,7 +24,7 @@ impl Engine {
             let header = self.header_of(&frame).await?;
             let total = header.total();
             all += total;
-            if pairs.is_too_small_for(total) {
+            if pairs.is_too_small_for(total, self.memberships.count().is_some()) {
                 // More than the caller wants: they stay on the GPU.
                 pairs.exceed();
             } else {
@@ -131,7 +131,7 @@ impl Engine {
             return Ok(());
         }
         if total > u64::from(u32::MAX) {
-            return Err(self.too_many(total, "; set a limit on the pairs, and no filter"));
+            return Err(self.too_many(total, "; set a limit on the pairs"));
         }
         self.download.ensure(&self.gpu, PAIRS_AT + total.min(self.downloadable()) * PAIR)?;
         if total > u64::from(self.output.capacity()) {
@@ -216,7 +216,7 @@ impl Engine {
         if count > 0 {
             let view = self.download.readable(&self.gpu, PAIRS_AT..PAIRS_AT + count * PAIR)?;
             let list: &[[u32; 2]] = bytemuck::cast_slice(&view);
-            pairs.extend(list, workers)?;
+            pairs.extend(list, workers, self.memberships.count().is_some())?;
             self.gpu.ends("reading out", Place::Host);
         }
         Ok(())

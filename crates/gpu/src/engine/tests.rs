@@ -7,9 +7,10 @@ use crate::params::{Header, Params};
 use crate::{Gpus, first_for_tests};
 use pollster::block_on;
 use sapwise::Aabb;
+use sapwise::algorithm::FramePlan;
 use sapwise::error::GpuErrorKind;
 use sapwise::internals::{SampledBoxes, Workers};
-use sapwise::{PairOrder, Pairs};
+use sapwise::{Filter, Membership, PairOrder, Pairs};
 use sapwise_scenes::Scenario;
 use wgpu::util::DeviceExt;
 
@@ -129,6 +130,31 @@ fn no_method_takes_more_dispatches() {
             assert_eq!(dispatched() - before, expected, "{method}, {} boxes", boxes.len());
             assert_eq!(finish(&mut engine), Ok(0));
         }
+    }
+}
+
+/// 600 boxes overlap, and only the pairs of the last box are wanted.
+#[test]
+fn unwanted_pairs_take_no_room_and_a_filter_is_uploaded_once() {
+    let Some(gpu) = first_for_tests() else { return };
+    let boxes = [Aabb::cube([1.0; 3], 1.0); 600];
+    let still = Membership { fixed: true, ..Membership::ALL };
+    for method in METHODS {
+        let mut engine = Engine::new(gpu.clone(), method).unwrap();
+        let mut pairs = Pairs::new();
+        pairs.set_filter(Some(Filter::new(vec![still; 599])));
+        let found = |engine: &mut Engine, pairs: &mut Pairs| {
+            pairs.clear();
+            block_on(engine.find(&FramePlan::default(), &boxes, pairs, &Workers::one())).unwrap();
+            pairs.len()
+        };
+        assert_eq!(found(&mut engine, &mut pairs), 599, "{method}");
+        assert!(engine.output.capacity() < 2000, "{method}");
+        // An unchanged filter does not replace this one.
+        engine.memberships.set(&gpu, Some(&Filter::default())).unwrap();
+        assert_eq!(found(&mut engine, &mut pairs), 600 * 599 / 2, "{method}");
+        let _ = pairs.filter_mut();
+        assert_eq!(found(&mut engine, &mut pairs), 599, "{method}");
     }
 }
 

@@ -53,7 +53,7 @@ fn hits(tile: vec2u, t: u32, wanted: bool) -> vec4u {
             let hi = vec3u(columns_hi[c], columns_hi_z[c]);
             let apart = a.lo.x > hi.x || lo.x > a.hi.x || a.lo.y > hi.y || lo.y > a.hi.y || a.lo.z > hi.z
                 || lo.z > a.hi.z;
-            word |= select(1u << (c & 31u), 0u, apart || !owned(a.lo.w, lo.w));
+            word |= select(1u << (c & 31u), 0u, apart || !owned(a.lo.w, lo.w) || !passes(a.lo.w, lo.w));
         }
         // Shifted rather than indexed by `w`: compilers may put a vector with a variable index into memory.
         found = vec4u(found.yzw, word);

@@ -55,9 +55,10 @@ struct Params {
     passes: u32,
     // Bits of the grid of the curve, above which are those of the size.
     curve_bits: u32,
+    // Memberships of the filter, if there is one; see `filter.wgsl`.
+    members: u32,
     unused_a: u32,
     unused_b: u32,
-    unused_c: u32,
     // The parts of the three axes, the sweep axis first: into the cells of the curve, then into slots and cells of
     // the grid. See `division.wgsl`.
     segments: array<Segment, 96>,

@@ -1,5 +1,5 @@
-// Counting and writing the pairs of sorted boxes, one row for each invocation. The next file defines the candidates
-// of a row: `search` calls `hit` for each pair. Its `before` returns the number of pairs of the block before a row.
+// Searching the pairs of sorted boxes, one row for each invocation. The next file defines the candidates of a row:
+// `search` calls `hit` for each pair. Its `before` returns the number of pairs of the block before a row.
 //
 // A row is tested with `params.budget` candidates in one submission and goes on in the next. Drivers give up on a
 // dispatch that takes seconds, and some end loops silently: lavapipe after 65 535 turns of all loops of an invocation
@@ -24,11 +24,8 @@ const DONE: u32 = 0xffffffffu;
 // The partner in the first pair of each row, then in the second, and so on.
 @group(0) @binding(7) var<storage, read_write> kept: array<u32>;
 
-var<private> writing: bool;
 // Pairs of this row found in this submission.
 var<private> found: u32;
-// Position of the first pair of this row in `pairs`.
-var<private> start: u32;
 // Candidates and nodes left in the budget of this row.
 var<private> left: u32;
 
@@ -47,67 +44,4 @@ fn test_row(row: u32) -> u32 {
     }
     left = params.budget;
     return search(row, state);
-}
-
-fn store(at: u32, pair: vec2u) {
-    // Positions before the window wrap around to numbers beyond every capacity.
-    if (at < params.capacity) {
-        pairs[at] = pair;
-    }
-}
-
-fn hit(row: u32, a: u32, b: u32) {
-    if (!owned(a, b)) {
-        return;
-    }
-    if (writing) {
-        store(start + found, pair_of(a, b));
-    } else if (found < KEPT) {
-        kept[found * params.objects + row] = b;
-    }
-    found++;
-}
-
-@compute @workgroup_size(64)
-fn count(@builtin(workgroup_id) w: vec3u, @builtin(num_workgroups) n: vec3u, @builtin(local_invocation_index) t: u32) {
-    let block = w.y * n.x + w.x;
-    let row = block * THREADS + t;
-    if (block >= params.blocks || row >= params.objects) {
-        return;
-    }
-    let state = test_row(row);
-    rows[row] = found;
-    rows[state_at(row, params.round + 1u)] = state;
-    if (state != DONE) {
-        atomicStore(&header.more, 1u);
-    }
-    if (found > 0u) {
-        atomicAdd(&sums[block], found);
-    }
-}
-
-@compute @workgroup_size(64)
-fn write(@builtin(workgroup_id) w: vec3u, @builtin(num_workgroups) n: vec3u, @builtin(local_invocation_index) t: u32) {
-    let block = w.y * n.x + w.x;
-    if (block >= params.blocks) {
-        return;
-    }
-    let row = block * THREADS + t;
-    var count = 0u;
-    if (row < params.objects) {
-        count = rows[row];
-    }
-    start = atomicLoad(&sums[block]) + before(row, t, count) - params.window;
-    if (count > KEPT) {
-        writing = true;
-        _ = test_row(row);
-        return;
-    }
-    if (count == 0u) {
-        return;
-    }
-    let a = boxes[row].lo.w;
-    for (var k = 0u; k < count; k++) {
-        store(start + k, pair_of(a, kept[k * params.objects + row]));
-    }
 }
