@@ -42,6 +42,7 @@ fn hits(tile: vec2u, t: u32, wanted: bool) -> vec4u {
         return found;
     }
     let a = load_box(row);
+    filter_for(a.lo.w);
     let count = min(TILE, params.objects - first);
     // Within one tile, only columns behind the row: each pair once.
     let begin = select(0u, t + 1u, tile.x == tile.y);
@@ -53,7 +54,7 @@ fn hits(tile: vec2u, t: u32, wanted: bool) -> vec4u {
             let hi = vec3u(columns_hi[c], columns_hi_z[c]);
             let apart = a.lo.x > hi.x || lo.x > a.hi.x || a.lo.y > hi.y || lo.y > a.hi.y || a.lo.z > hi.z
                 || lo.z > a.hi.z;
-            word |= select(1u << (c & 31u), 0u, apart || !owned(a.lo.w, lo.w) || !passes(a.lo.w, lo.w));
+            word |= select(1u << (c & 31u), 0u, apart || !owned(a.lo.w, lo.w) || !passes(lo.w));
         }
         // Shifted rather than indexed by `w`: compilers may put a vector with a variable index into memory.
         found = vec4u(found.yzw, word);

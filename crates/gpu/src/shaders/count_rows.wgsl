@@ -1,7 +1,7 @@
 // Counting the pairs of each row. The first ones are kept.
 
 fn hit(row: u32, a: u32, b: u32) {
-    if (!owned(a, b) || !passes(a, b)) {
+    if (!owned(a, b) || !passes(b)) {
         return;
     }
     if (found < KEPT) {

@@ -13,8 +13,14 @@ fn membership(id: u32) -> vec4u {
     return vec4u(0xffffffffu, 0xffffffffu, 0u, 0u);
 }
 
-fn passes(a: u32, b: u32) -> bool {
-    let m = membership(a);
-    let o = membership(b);
-    return (m.x & o.y) != 0u && (o.x & m.y) != 0u && (m.w & o.w) == 0u && (m.z != o.z || m.z == 0u);
+// The membership of the box whose pairs this invocation searches.
+var<private> own: vec4u;
+
+fn filter_for(row: u32) {
+    own = membership(row);
+}
+
+fn passes(other: u32) -> bool {
+    let m = membership(other);
+    return (own.x & m.y) != 0u && (m.x & own.y) != 0u && (own.w & m.w) == 0u && (own.z != m.z || own.z == 0u);
 }

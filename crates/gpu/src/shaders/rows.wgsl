@@ -43,5 +43,6 @@ fn test_row(row: u32) -> u32 {
         }
     }
     left = params.budget;
+    filter_for(boxes[row].lo.w);
     return search(row, state);
 }

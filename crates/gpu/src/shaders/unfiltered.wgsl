@@ -1,5 +1,7 @@
 // No filter.
 
-fn passes(a: u32, b: u32) -> bool {
+fn filter_for(row: u32) {}
+
+fn passes(other: u32) -> bool {
     return true;
 }

@@ -11,7 +11,7 @@ fn store(at: u32, pair: vec2u) {
 }
 
 fn hit(row: u32, a: u32, b: u32) {
-    if (owned(a, b) && passes(a, b)) {
+    if (owned(a, b) && passes(b)) {
         store(start + found, pair_of(a, b));
         found++;
     }
