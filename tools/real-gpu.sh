@@ -1,7 +1,13 @@
 #!/usr/bin/env bash
-# Measures a machine with a real GPU, in one command of less than ten minutes:
+# Measures a machine with a real GPU, in commands of less than ten minutes each:
 #
 #     tools/real-gpu.sh OUT_DIR
+#     tools/real-gpu.sh --scenes OUT_DIR       # eight scenes by the adaptive choice and by every algorithm
+#     tools/real-gpu.sh --pair-cache OUT_DIR   # pair-cache beside the GPU, over a stream of rapier3d and four scenes
+#     tools/real-gpu.sh --report OUT_DIR       # the report and the benchmark only
+#
+# The last three leave at most eight files. --scenes prints the mean and the worst time over the best single algorithm.
+# Its tuning is predicted by a model that has not seen the card: the built-in one, or unseen.json on an H100 or H200.
 #
 # Runs the algorithms on GPUs against the oracle, times each dispatch, and runs the benchmark of 1000 to 10 million
 # objects with boxes in host and in device memory, the full probe and sweep, predicted and measured tuning, and a
@@ -29,6 +35,9 @@
 # SKIP          names of steps to leave out, as they are printed; every_size takes hours on a software GPU
 # ONLY          names of steps to run, and no others
 # SAPWISE_GPUS  the GPUs of the benchmark, such as gpu0,gpu0+1 [default: all]
+# SOFTWARE      1: uses software GPUs too, to rehearse on a machine without a real one
+# OBJECTS       objects of each scene of --scenes and --pair-cache [default: 20000 and 30000]
+# FRAMES        frames of these scenes [default: 100]
 set -euo pipefail
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
@@ -64,6 +73,10 @@ build() {
     for name in sapwise gpu_bench "${tests[@]}"; do
         [ -x "$into/$name" ] || fail "cargo built no $name"
     done
+    cp "$here/../tests/fixtures/fragments.npy" "$into/"
+    # One GPU of this family is in the built-in model.
+    find "$here/../datasets" -name '*.json' ! -path '*/published/*' ! -name 'nvidia-h200.json' -print0 \
+        | sort -z | xargs -0 "$into/sapwise" train --out "$into/unseen.json" >/dev/null
 }
 
 pack() {
@@ -149,7 +162,7 @@ step() {
 what=all
 case ${1:-} in
     --pack) [ $# = 2 ] || usage; pack "$2"; exit ;;
-    --profiles) what=profiles; shift ;;
+    --profiles | --scenes | --pair-cache | --report) what=${1#--}; shift ;;
     '' | -*) usage ;;
 esac
 [ $# = 1 ] && [ -n "$1" ] || usage
@@ -184,11 +197,65 @@ if [ $what = profiles ]; then
 fi
 # Tests fail if they find no GPU.
 export SAPWISE_REQUIRE_GPU=1
+software=()
+[ -z "${SOFTWARE:-}" ] || software=(--software-gpus)
+
+# scene SCENE SECONDS OPTION...: a step that runs a scene or a stream, with its output at the end of scenes.log.
+scene() {
+    local name=${1##*/} limit=$2
+    name=${name%.npy}
+    step "$name" "$limit" "$bin/sapwise" run "$1" --tuning predicted.json "${software[@]}" "${@:3}"
+    [ ! -e "$name.log" ] || { cat "$name.log" >>scenes.log; rm "$name.log"; }
+}
+end() {
+    [ ${#failed[@]} = 0 ] || { echo "${#failed[@]} failed: ${failed[*]}; the logs are in $out"; exit 1; }
+    echo "all done in $SECONDS s; $*"
+    exit
+}
 
 # Building does not count.
 SECONDS=0
 step devices 15 "$bin/sapwise" devices
 [ ! -e devices.log ] || cat devices.log
+if [ $what = scenes ] || [ $what = pair-cache ]; then
+    grep -qE '^gpu[0-9]+ ' devices.log || fail "there is no GPU"
+    [ -n "${SOFTWARE:-}" ] || grep -qE '^gpu[0-9]+ +(discrete|integrated|virtual|other)' devices.log \
+        || fail "there is no real GPU; SOFTWARE=1 rehearses on others"
+    model=()
+    ! grep -qE 'H[12]00' devices.log || model=(--model "$bin/unseen.json")
+    step predict 30 "$bin/sapwise" predict "${model[@]}" "${software[@]}" --out predicted.json
+    [ -e predicted.json ] || fail "there is no tuning; see $out/predict.log"
+    rm -f scenes.log
+fi
+if [ $what = scenes ]; then
+    objects=${OBJECTS:-20000} frames=${FRAMES:-100}
+    for name in uniform fast clustered mixed resting gravity; do
+        scene $name 60 --objects "$objects" --frames "$frames" --repeats 4
+    done
+    scene slab 80 --objects "$objects" --swing 50 --frames $((3 * frames)) --repeats 2
+    scene fragmentation 100 --objects "$objects" --repeats 2 ${FRAMES:+--frames "$FRAMES"}
+    # The first number after `all` is the time over that of the best single algorithm.
+    awk '/^[a-z-]+, [0-9 ]+ frames/ { name = $1; sub(",", "", name) }
+        $1 == "all" { printf "%-14s %s\n", name, $2; n++; sum += log($2); if ($2 > worst) worst = $2 }
+        END { printf "%d scenes over the best single algorithm: mean %.3f, worst %.3f\n", n, exp(sum / n), worst }' \
+        scenes.log | tee scenes.txt
+    end "$out/scenes.txt has the times over the best single algorithm, scenes.log every algorithm"
+fi
+if [ $what = pair-cache ]; then
+    scene "$bin/fragments.npy" 60 --repeats 4
+    for name in resting asleep brownian gravity; do
+        scene $name 110 --objects "${OBJECTS:-30000}" --frames "${FRAMES:-100}" --repeats 3
+    done
+    grep -E '^(run by|pair-cache|[a-z-]+@gpu|adaptive)|, [0-9 ]+ frames' scenes.log | tee pair-cache.txt
+    end "$out/pair-cache.txt has the times, scenes.log those of every algorithm"
+fi
+if [ $what = report ]; then
+    step probe 300 "$bin/sapwise" probe "${software[@]}" --out report.json
+    step check 15 "$bin/sapwise" check report.json
+    step gpu_bench 240 "$bin/gpu_bench" --bench
+    [ ! -e gpu_bench.log ] || sed -n '/^[-|]/p' gpu_bench.log >bench.md
+    end "$out/report.json is the report, bench.md the benchmark"
+fi
 for name in "${tests[@]}"; do
     [ ! -x "$bin/$name" ] || step "$name" 60 "$bin/$name"
 done
@@ -205,9 +272,4 @@ step measured 5 "$bin/sapwise" predict --report report.json --measured --out mea
 # Runs every algorithm in every frame: 22 s with 29 algorithms on 16 cores and an H200.
 step run 45 "$bin/sapwise" run fragmentation --objects 20000 --repeats 1 --tuning measured.json --plot run.svg
 
-if [ ${#failed[@]} = 0 ]; then
-    echo "all done in $SECONDS s; $out/report.json is the report, bench.md the benchmark"
-else
-    echo "${#failed[@]} failed: ${failed[*]}; the logs are in $out"
-    exit 1
-fi
+end "$out/report.json is the report, bench.md the benchmark"
