@@ -95,7 +95,10 @@ impl Cells {
 
     pub(super) fn record(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
         let Some([add_up, begin, put]) = &self.bound else { return };
-        add_up.dispatch(pass, params.cell_blocks);
+        // `begin` reads the sums of the blocks before its own.
+        if params.cell_blocks > 1 {
+            add_up.dispatch(pass, params.cell_blocks);
+        }
         begin.dispatch(pass, params.cell_blocks);
         put.dispatch(pass, params.objects.div_ceil(BOXES));
     }

@@ -89,7 +89,9 @@ impl Sort {
 
     pub(super) fn record(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
         for [add_counts, scatter] in self.passes.iter().take(params.passes as usize) {
-            add_counts.dispatch(pass, ADDERS);
+            if params.objects > BLOCK {
+                add_counts.dispatch(pass, ADDERS);
+            }
             scatter.dispatch(pass, params.objects.div_ceil(BLOCK));
         }
     }

@@ -32,7 +32,7 @@ struct Pass {
 // goes.
 var<workgroup> masks: array<atomic<u32>, 2048>;
 
-// Turns counts into starts. Each workgroup has some digits, and its starts are numbers of keys with these digits. The
+// Turns counts into starts, unless there is one block only. Each workgroup has some digits, and its starts are numbers of keys with these digits. The
 // number of all of them comes behind all starts.
 @compute @workgroup_size(256)
 fn add_counts(@builtin(workgroup_id) w: vec3u, @builtin(local_invocation_index) t: u32) {
@@ -67,8 +67,15 @@ fn scatter(
         return;
     }
     // Invocation t stands for digit t too: where the next key with that digit goes.
-    let keys = select(0u, starts[DIGITS * blocks() + t / TOGETHER], t % TOGETHER == TOGETHER - 1u);
-    var next = starts[t * blocks() + block] + exclusive(t, keys);
+    var keys = 0u;
+    var start = 0u;
+    if (blocks() == 1u) {
+        keys = atomicLoad(&counts[counts_at(radix.number, t, 0u)]);
+    } else {
+        keys = select(0u, starts[DIGITS * blocks() + t / TOGETHER], t % TOGETHER == TOGETHER - 1u);
+        start = starts[t * blocks() + block];
+    }
+    var next = start + exclusive(t, keys);
     for (var group = 0u; group < GROUPS; group++) {
         atomicStore(&masks[group * DIGITS + t], 0u);
     }
