@@ -2,11 +2,13 @@
 
 mod common;
 
-use common::{Random, gpus, naive};
+use common::{Random, gpus, naive, naive_filtered};
 use sapwise::algorithm::{Entry, Load};
 use sapwise::tuning::{AlgorithmCost, CostCurve, CostTerm, Source, Term};
-use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, PairOrder, Pairs, Reason, Registry, Tuning};
-use sapwise_gpu::{Gpu, GpuIdentity, GpuKind, Gpus, broad_phase, wgpu30 as wgpu};
+use sapwise::{
+    Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Filter, Membership, PairOrder, Pairs, Reason, Registry, Tuning,
+};
+use sapwise_gpu::{Gpu, GpuIdentity, GpuKind, Gpus, Resident, broad_phase, wgpu30 as wgpu};
 use sapwise_scenes::Scenario;
 
 const METHODS: [&str; 4] = ["brute", "sap", "grid-sap", "bvh"];
@@ -300,6 +302,29 @@ fn more_pairs_than_a_buffer_holds_come_in_windows() {
         for _ in 0..2 {
             assert!(pairs_of(algorithm.as_mut(), &boxes).unwrap() == oracle, "{method}");
         }
+    }
+}
+
+/// 64 KiB hold 4096 memberships. The frame comes in pieces.
+#[test]
+fn filters_too_large_for_a_device_are_tested_on_the_host() {
+    let Some(gpus) = gpus() else { return };
+    let gpu = small(&gpus, 64 << 10);
+    let mut random = Random(15);
+    let boxes = random.cubes(4000, [18.0; 3], 0.6);
+    for method in METHODS {
+        let mut algorithm = broad_phase(method, vec![gpu.clone()]).unwrap();
+        let mut pairs = Pairs::with_order(PairOrder::Canonical);
+        for memberships in [5000, 4000, 4500] {
+            let memberships: Vec<Membership> = (0..memberships).map(|_| random.membership()).collect();
+            pairs.set_filter(Some(Filter::new(memberships.clone())));
+            algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+            assert!(pairs.as_slice() == naive_filtered(&boxes, &memberships), "{method}, {}", memberships.len());
+            let all_wanted = pairs.overlapping() == pairs.len() as u64;
+            assert_eq!(all_wanted, memberships.len() == 4000, "{method}, {}", memberships.len());
+        }
+        let error = Resident::new(&gpu, method).unwrap().set_filter(pairs.filter()).unwrap_err().to_string();
+        assert!(error.contains("72000 bytes for memberships"), "{error}");
     }
 }
 
