@@ -151,8 +151,8 @@ impl Pairs {
     /// filter dropped.
     ///
     /// Without a filter this is [`len`](Self::len). With one it depends on the algorithm: `brute`, `sap` and `grid-sap`
-    /// find unwanted pairs that `bvh` and `pair-cache` rule out earlier. GPUs do not count them, unless the filter is too
-    /// large for one buffer and the host tests the pairs.
+    /// find unwanted pairs that `bvh` and `pair-cache` rule out earlier. GPUs do not count them, unless the filter
+    /// does not fit into a buffer and the host tests the pairs.
     #[must_use]
     pub fn overlapping(&self) -> u64 {
         self.len as u64 + self.unwanted

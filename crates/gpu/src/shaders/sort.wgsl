@@ -32,8 +32,8 @@ struct Pass {
 // goes.
 var<workgroup> masks: array<atomic<u32>, 2048>;
 
-// Turns counts into starts, unless there is one block only. Each workgroup has some digits, and its starts are numbers of keys with these digits. The
-// number of all of them comes behind all starts.
+// Turns counts into starts, unless there is one block only. Each workgroup has some digits, and its starts are numbers
+// of keys with these digits. The number of all of them comes behind all starts.
 @compute @workgroup_size(256)
 fn add_counts(@builtin(workgroup_id) w: vec3u, @builtin(local_invocation_index) t: u32) {
     let count = TOGETHER * blocks();
