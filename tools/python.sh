@@ -4,6 +4,7 @@
 #   tools/python.sh            # formatting, clippy, wheel, tests
 #   tools/python.sh wheel      # builds the wheel and tells where it is
 #   tools/python.sh sdist      # builds the source distribution, and installs it
+#   tools/python.sh gpu        # builds the wheel sapwise-gpu, with methods on GPUs, and tests it on software adapters
 #   tools/python.sh aarch64    # builds the wheel for 64-bit ARM with zig, and uses it in QEMU
 #   tools/python.sh bench      # times: overhead, other libraries, the import; into results/python.csv
 #   tools/python.sh examples   # runs bindings/python/examples/ and writes their pictures to target/python/examples/
@@ -29,7 +30,7 @@ pip() { local environment=$1; shift; "$environment/bin/python" -m pip install --
 wheel() {
     rm -rf "$folder/wheels"
     "$folder/tools/bin/maturin" build --quiet --release --locked --strip --manifest-path bindings/python/Cargo.toml --out "$folder/wheels" \
-        --interpreter "$python"
+        --interpreter "$python" "$@"
     wheel=$(echo "$folder"/wheels/*.whl)
 }
 
@@ -49,6 +50,13 @@ sizes() {
     [ "$installed" -le 10000000 ] || fail "installed it has more than 10 MB"
 }
 
+# These files of tests, or all. From outside of bindings/python/, so that what is tested is what was installed.
+run() {
+    local package=$root/bindings/python files=("${@:-.}")
+    cd "$folder"
+    fresh/bin/python -m pytest -c "$package/pyproject.toml" --rootdir "$package" -p no:cacheprovider "${files[@]/#/$package/tests/}"
+}
+
 case $what in
 wheel)
     wheel
@@ -60,14 +68,45 @@ test)
     wheel
     fresh pytest scipy hypothesis rtree python-fcl
     sizes
-    # From outside of bindings/python/, so that what is tested is what was installed.
-    cd "$folder"
-    tests=$root/bindings/python/tests
-    run() { fresh/bin/python -m pytest -c "$root/bindings/python/pyproject.toml" --rootdir "$root/bindings/python" -p no:cacheprovider "$@"; }
-    run "$tests/test_reports.py" "$tests/test_package.py" "$tests/test_machine.py"
+    run test_reports.py test_package.py test_machine.py
     # mypy holds the stubs against the package.
     pip "$folder/fresh" pandas pandas-stubs mypy
-    run "$tests"
+    run
+    ;;
+gpu)
+    wheel --features gpu
+    # The same module under another name: only one of the two wheels is installed.
+    pip "$folder/tools" wheel
+    (
+        cd "$folder/wheels"
+        "$folder/tools/bin/wheel" unpack --dest . "$wheel" && rm "$wheel"
+        mv sapwise-* sapwise_gpu && cd sapwise_gpu
+        for info in *.dist-info; do mv "$info" "sapwise_gpu-${info#sapwise-}"; done
+        sed -i 's/^Name: sapwise$/Name: sapwise-gpu/' ./*.dist-info/METADATA
+        "$folder/tools/bin/wheel" pack --dest-dir .. .
+    )
+    wheel=$(echo "$folder"/wheels/*.whl)
+    fresh pytest scipy hypothesis rtree python-fcl
+    bytes=$(stat -c %s "$wheel")
+    echo "python: the wheel with GPUs has $bytes bytes"
+    [ "$bytes" -le 12000000 ] || fail "the wheel with GPUs has more than 12 MB"
+    gpus=$("$root/tools/software-gpus.sh")
+    eval "$gpus"
+    cd "$folder"
+    fresh/bin/python - <<'END'
+import numpy as np, sapwise
+low = np.random.default_rng(1).uniform(0, 20, (3000, 3)).astype(np.float32)
+boxes = np.concatenate([low, low + 1], axis=1)
+known = sapwise.pairs(boxes, algorithm="brute@cpu1")
+for name in ["brute@gpu0", "sap@gpu0", "grid-sap@gpu0", "bvh@gpu1", "bvh@gpu0+1"]:
+    assert len(known) > 1000 and np.array_equal(sapwise.pairs(boxes, algorithm=name), known)
+    assert sapwise.last_decision().algorithm == name
+with sapwise.Space(algorithm="grid-sap@gpu0", cache=False) as space:
+    space.insert(boxes)
+    space.update()
+    assert len(space.pairs()) == len(known)
+END
+    run
     ;;
 sdist)
     rm -rf "$folder/sdist"
@@ -142,5 +181,5 @@ index)
     fresh
     "$folder/fresh/bin/python" tools/python_index.py docs/python.md
     ;;
-*) fail "usage: tools/python.sh [test|wheel|sdist|aarch64|bench|examples|index]" ;;
+*) fail "usage: tools/python.sh [test|wheel|gpu|sdist|aarch64|bench|examples|index]" ;;
 esac

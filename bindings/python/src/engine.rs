@@ -9,7 +9,7 @@ use numpy::PyArray2;
 use numpy::ndarray::Array2;
 use pyo3::prelude::*;
 use sapwise::algorithm::Load;
-use sapwise::{Aabb, Adaptive, Between, BroadPhase, Error, Filter, PairOrder, Pairs, Registry, Worlds};
+use sapwise::{Aabb, Adaptive, Between, BroadPhase, Error, Filter, PairOrder, Pairs, Worlds};
 use sapwise_tune::StartOptions;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -52,7 +52,6 @@ pub(crate) struct Exactly<'a> {
 
 /// What searches, with its lists of pairs, used by one call at a time.
 struct Engine {
-    registry: Arc<Registry>,
     adaptive: Adaptive,
     /// One for each algorithm that callers have named, with the name.
     named: Vec<(String, Adaptive)>,
@@ -123,7 +122,7 @@ impl Idle {
 impl Engine {
     /// With the tuning that was kept of this machine, or with built-in thresholds. Nothing is measured.
     fn new() -> Result<Self, Error> {
-        let registry = Arc::new(Registry::new());
+        let registry = Arc::new(start::registry(None));
         let options = StartOptions::new().background(false).measure(None).registry(Arc::clone(&registry));
         let mut adaptive = sapwise_tune::for_this_machine(&options)?;
         adaptive.set_exploring(false);
@@ -132,7 +131,6 @@ impl Engine {
             named: Vec::new(),
             between: Between::new(&registry)?,
             worlds: Worlds::new(&registry)?,
-            registry,
             pairs: [None, None],
             ran: Ran::Adaptive,
         })
@@ -190,7 +188,7 @@ impl Engine {
                 let at = match self.named.iter().position(|(known, _)| known == name) {
                     Some(at) => at,
                     None => {
-                        self.named.push((name.to_owned(), start::only(name, &self.registry)?));
+                        self.named.push((name.to_owned(), start::only(name, None)?));
                         self.named.len() - 1
                     }
                 };

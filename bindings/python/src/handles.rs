@@ -13,8 +13,13 @@ pub(crate) fn handles(given: &Bound<'_, PyAny>) -> PyResult<Vec<Handle>> {
         _ => call(py, "sapwise._arrays", "handles", (given,))?.cast_into::<PyArray1<u64>>()?,
     };
     let array = array.try_readonly()?;
-    let named = |(index, &bits)| Handle::from_bits(bits).ok_or_else(|| stale(py, index, bits));
-    array.as_slice()?.iter().enumerate().map(named).collect()
+    let numbers = array.as_slice()?;
+    // Collected into a result, the list would grow step by step.
+    let mut handles = Vec::with_capacity(numbers.len());
+    for (index, &bits) in numbers.iter().enumerate() {
+        handles.push(Handle::from_bits(bits).ok_or_else(|| stale(py, index, bits))?);
+    }
+    Ok(handles)
 }
 
 /// Makes the exception for the first handle without a body.

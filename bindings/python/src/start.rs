@@ -7,7 +7,6 @@ use pyo3::prelude::*;
 use sapwise::{Adaptive, Error, PairOrder, Pairs, Registry, Tuning};
 use sapwise_tune::StartOptions;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::time::Duration;
 
 /// What a caller asked for.
@@ -56,18 +55,15 @@ impl Start {
         })
     }
 
-    /// The algorithms to choose from.
-    fn registry(&self) -> Arc<Registry> {
-        Arc::new(self.threads.map_or_else(Registry::new, Registry::with_cores))
-    }
-
     /// An adaptive broad phase. May take as long as the options let a measurement take.
     pub(crate) fn adaptive(&self) -> Result<Adaptive, Error> {
-        let registry = self.registry();
+        let registry = || registry(self.threads);
         let mut adaptive = match (&self.algorithm, &self.tuning) {
-            (Some(name), _) => only(name, &registry)?,
-            (None, Some(tuning)) => Adaptive::new(tuning.clone(), &registry)?,
-            (None, None) => sapwise_tune::for_this_machine(&self.options.clone().registry(registry))?,
+            (Some(name), _) => only(name, self.threads)?,
+            (None, Some(tuning)) => Adaptive::new(tuning.clone(), &registry())?,
+            // Its thread looks for GPUs.
+            (None, None) if self.threads.is_none() => sapwise_tune::for_this_machine(&self.options)?,
+            (None, None) => sapwise_tune::for_this_machine(&self.options.clone().registry(registry().into()))?,
         };
         adaptive.set_learning(self.learning);
         adaptive.set_exploring(self.exploring);
@@ -85,6 +81,23 @@ impl Start {
     }
 }
 
+/// Returns the algorithms to choose from on so many threads. `None`: all usable cores.
+pub(crate) fn registry(threads: Option<u32>) -> Registry {
+    let registry = threads.map_or_else(Registry::new, Registry::with_cores);
+    #[cfg(feature = "gpu")]
+    let registry = with_gpus(registry, |kind| kind != sapwise_gpu::GpuKind::Software);
+    registry
+}
+
+/// Adds the algorithms on GPUs of these kinds. The GPUs are found once.
+#[cfg(feature = "gpu")]
+fn with_gpus(mut registry: Registry, wanted: impl Fn(sapwise_gpu::GpuKind) -> bool) -> Registry {
+    static FOUND: std::sync::OnceLock<sapwise_gpu::Gpus> = std::sync::OnceLock::new();
+    let gpus = FOUND.get_or_init(sapwise_gpu::Gpus::find).choose(|gpu| wanted(gpu.kind));
+    sapwise_gpu::add_to(&mut registry, &gpus);
+    registry
+}
+
 /// Makes an empty list of pairs. Without a limit, free memory limits it.
 pub(crate) fn pairs(order: PairOrder, limit: Option<usize>) -> Pairs {
     let mut pairs = Pairs::with_order(order);
@@ -98,7 +111,14 @@ pub(crate) fn order(ordered: bool) -> PairOrder {
 }
 
 /// Makes what always runs the algorithm of this name.
-pub(crate) fn only(name: &str, registry: &Registry) -> Result<Adaptive, Error> {
+pub(crate) fn only(name: &str, threads: Option<u32>) -> Result<Adaptive, Error> {
+    #[cfg_attr(not(feature = "gpu"), expect(unused_mut, reason = "there is nothing to add"))]
+    let mut registry = registry(threads);
+    // Who names an algorithm may want a software adapter.
+    #[cfg(feature = "gpu")]
+    if name.contains("@gpu") {
+        registry = with_gpus(registry, |_| true);
+    }
     let parsed = name.parse().map_err(|_| {
         let known: Vec<String> = registry.available().iter().map(|entry| entry.id.to_string()).collect();
         let method = |id: &&String| id.split('@').next() == Some(name);
@@ -110,7 +130,7 @@ pub(crate) fn only(name: &str, registry: &Registry) -> Result<Adaptive, Error> {
         };
         Error::UnknownAlgorithm { text: name.to_owned(), hint }
     })?;
-    Adaptive::only(parsed, registry)
+    Adaptive::only(parsed, &registry)
 }
 
 /// Converts the argument `limit`.
