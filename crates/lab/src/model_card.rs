@@ -17,7 +17,7 @@ non-negative units: calls, objects, sorting, objects outside the cache, tests, p
 a parameter: clock, SIMD lanes or memory bandwidth. A Gaussian process over the load, the residual, multiplies the
 sum; machines of alike SIMD levels have alike residuals. `pair-cache` takes the smaller of its own sum and that of
 `bvh`. On several threads the work is divided by the speed-up, plus the calls of the helpers and what is lost while
-they wake up; this has a residual of its own. All machines share these units.
+they wake up. All machines share these units.
 
 Not for timing promises: a predicted time may be further off than the choice that follows from it.";
 

@@ -30,7 +30,7 @@ pub const GPU_PREFIX: &str = "gpu/";
 ///
 /// The time of a frame on one thread, or on GPUs, is `sum of unit * scale(hardware, backend) * term(load)`, times
 /// `exp` of a [residual](GroupResidual) over the load. [Helpers](HelpersModel) turn it into the time on several
-/// threads, which has a residual of its own.
+/// threads.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
@@ -91,9 +91,6 @@ pub struct MethodModel {
     /// Effect of several threads; `None` for a method that runs on one thread only, or on GPUs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub helpers: Option<HelpersModel>,
-    /// What the helpers leave unexplained, for each number of threads and fork and join of the training.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub thread_residual: Vec<GroupResidual>,
     /// Standard deviation of the remaining error, in natural logarithms.
     pub spread_ln: f64,
 }
@@ -135,7 +132,6 @@ impl MethodModel {
             residual: Vec::new(),
             residual_by_motion: false,
             helpers: None,
-            thread_residual: Vec::new(),
             spread_ln: 0.0,
         }
     }
@@ -143,16 +139,12 @@ impl MethodModel {
     /// Returns the method with its physical terms and helpers alone.
     #[must_use]
     pub fn without_residual(&self) -> Self {
-        Self { residual: Vec::new(), thread_residual: Vec::new(), ..self.clone() }
+        Self { residual: Vec::new(), ..self.clone() }
     }
 
     /// What makes it unusable, if anything.
     fn defect(&self, places: usize) -> Option<String> {
         let axes = usize::from(self.backend == BackendClass::Cpu);
-        let of_residuals = || {
-            let one = GroupResidual::defect(&self.residual, places, axes);
-            one.or_else(|| GroupResidual::defect(&self.thread_residual, places, 2))
-        };
         if let Some(t) = self.terms.iter().find(|t| !t.scale.is_of(self.backend)) {
             Some(format!("the scale {} is of another processor", t.scale))
         } else if self.helpers.is_some() && self.backend != BackendClass::Cpu {
@@ -166,7 +158,7 @@ impl MethodModel {
         } else if !(0.0..f64::INFINITY).contains(&self.spread_ln) {
             Some(format!("its spread is {}", self.spread_ln))
         } else {
-            of_residuals()
+            GroupResidual::defect(&self.residual, places, axes)
         }
     }
 }

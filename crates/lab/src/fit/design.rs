@@ -46,8 +46,8 @@ pub(super) struct Design {
     values: Array2<f64>,
     /// The rows on several threads, with what their machines make of these and the time on one thread.
     called: Vec<(Row, ThreadFigures, Option<f64>)>,
-    /// The groups of both for residuals.
-    groups: [Groups; 2],
+    /// The groups of those on one thread for residuals.
+    groups: Groups,
     /// The method was never timed on one thread, so that its time on several counts as its work.
     never_alone: bool,
 }
@@ -64,7 +64,7 @@ impl Design {
         notes: &mut Vec<String>,
     ) -> Self {
         let (mut kept, mut values) = (Vec::new(), Vec::new());
-        let mut positions = [Vec::new(), Vec::new()];
+        let mut positions = Vec::new();
         let mut note = |row: &Row, why: PredictError| {
             let (profile, id) = (&profiles[row.profile], profiles[row.profile].id(row.algorithm).to_string());
             // Of several GPUs one may lack a parameter.
@@ -86,7 +86,7 @@ impl Design {
             match ns.and_then(|ns| Ok((ns, at()?))) {
                 Ok((ns, at)) => {
                     values.extend(ns);
-                    positions[0].push(at);
+                    positions.push(at);
                     kept.push(row);
                 }
                 Err(why) => note(&row, why),
@@ -96,10 +96,8 @@ impl Design {
         for row in called.into_iter().filter(|r| !r.floor) {
             let profile = &profiles[row.profile];
             let threads = profile.id(row.algorithm).threads();
-            let at = || GroupResidual::of_threads(&profile.hardware, threads);
-            match ThreadFigures::of(&profile.hardware, threads).and_then(|figures| Ok((figures, at()?))) {
-                Ok((figures, at)) => {
-                    positions[1].push(at);
+            match ThreadFigures::of(&profile.hardware, threads) {
+                Ok(figures) => {
                     let alone = AlgorithmId::new(&method, Backend::Cpu(1)).ok().and_then(|one| profile.position(&one));
                     let alone_ns = alone.and_then(|one| profile.points[row.spot as usize].of_position(one));
                     with_figures.push((row, figures, alone_ns));
@@ -108,12 +106,8 @@ impl Design {
             }
         }
         let values = Array2::from_shape_vec((kept.len(), components.len()), values).unwrap_or_default();
-        let [alone, several] = positions;
-        let groups = |rows: Vec<(&Row, Vec<f64>)>| Groups::new(&rows, machines, features, is_incremental(&method));
-        let groups = [
-            groups(kept.iter().zip(alone).collect()),
-            groups(with_figures.iter().map(|called| &called.0).zip(several).collect()),
-        ];
+        let rows: Vec<(&Row, Vec<f64>)> = kept.iter().zip(positions).collect();
+        let groups = Groups::new(&rows, machines, features, is_incremental(&method));
         Self { method, class, components, rows: kept, values, called: with_figures, groups, never_alone }
     }
 
@@ -198,7 +192,7 @@ impl Design {
         let ln: Vec<f64> = all.ns.iter().zip(&modelled).map(|(ns, modelled)| (ns / modelled).ln()).collect();
         let (residual, left) = match gpu_kinds[..] {
             [GpuKind::Software] => (Vec::new(), ln),
-            _ => self.groups[0].residual(basis, |k| measured.binary_search(&k).is_ok(), &ln)?,
+            _ => self.groups.residual(basis, |k| measured.binary_search(&k).is_ok(), &ln)?,
         };
         let spread_ln = robust_deviation(&left).unwrap_or(0.0);
         let used = self.components.iter().zip(&units).filter(|(_, u)| **u > 0.0);
@@ -219,8 +213,7 @@ impl Design {
         Ok(Some(model))
     }
 
-    /// Fits to the rows on several threads what helpers make of the work of one, as measured where it was timed too,
-    /// and the residual of that.
+    /// Fits to the rows on several threads what helpers make of the work of one, as measured where it was timed too.
     ///
     /// # Errors
     /// When the model can't predict a profile that it was fitted to.
@@ -268,10 +261,6 @@ impl Design {
         // At random: even steps would take the same few sizes from every scenario.
         let some = Random::named(1, &["helpers"]).shuffled(called.len());
         model.helpers = late_helpers::fit(&some.iter().take(MOST_CALLED).map(|&k| called[k]).collect::<Vec<_>>());
-        let Some(helpers) = model.helpers else { return Ok(()) };
-        let ln = |c: &Called| (c.ns / helpers.with(c.figures, c.threads).cost_ns(c.objects, c.work_ns)).ln();
-        let ln: Vec<f64> = called.iter().map(ln).collect();
-        model.thread_residual = self.groups[1].residual(basis, |k| chosen[self.called[k].0.profile], &ln)?.0;
         Ok(())
     }
 

@@ -67,9 +67,13 @@ fn on_cpu(method: &str) -> Vec<(Term, Scale)> {
         list.push((ColdObjects, Byte));
     }
     list.extend(tests(method).iter().flat_map(|&t| [(t, Lane), (t, Cycle)]));
-    list.push((Pairs, Cycle));
+    // A vector tests nodes of a tree and writes pairs.
+    if method == "bvh" {
+        list.push((Objects, Lane));
+    }
+    list.extend([(Pairs, Lane), (Pairs, Cycle)]);
     if is_incremental(method) {
-        list.push((MovedShare, Cycle));
+        list.extend([(MovedShare, Cycle), (Moved, Cycle)]);
     }
     list
 }

@@ -35,7 +35,8 @@ impl MethodModel {
             BackendClass::Cpu if !self.residual.is_empty() => GroupResidual::of_one_thread(hardware)?,
             _ => Vec::new(),
         };
-        let residual = self.residual_at(&self.residual, &at, places);
+        let weights = GroupResidual::weights_at(&self.residual, &at);
+        let residual = Residual::new(Arc::clone(places), weights, self.residual_by_motion);
         let work = Work {
             terms,
             fallback,
@@ -44,36 +45,21 @@ impl MethodModel {
                 // No term of a GPU depends on the caches of the CPU.
                 BackendClass::Gpu => 0.0,
             },
-            residual,
+            residual: Some(residual).filter(|r| !r.weights.is_empty()),
         };
         work.defect().map_or(Ok(work), |e| Err(PredictError::Curve(e)))
     }
 
-    /// Returns the cost curve of this method on a backend of a machine, with its cost on one thread or on GPUs and
-    /// the places of its model.
+    /// Returns the cost curve of this method on a backend of a machine, with its cost on one thread or on GPUs.
     ///
     /// # Errors
     /// Names the hardware parameter that is missing, or what is wrong with the curve.
-    pub fn curve(
-        &self,
-        work: Arc<Work>,
-        hardware: &Hardware,
-        backend: &Backend,
-        places: &Arc<Places>,
-    ) -> Result<CostCurve, PredictError> {
+    pub fn curve(&self, work: Arc<Work>, hardware: &Hardware, backend: &Backend) -> Result<CostCurve, PredictError> {
         let mut curve = CostCurve::of(work);
         if let Backend::Cpu(threads @ 2..) = *backend {
             curve.helpers = self.helpers.unwrap_or(UNSEEN).on(hardware, threads)?;
-            let at = GroupResidual::of_threads(hardware, threads)?;
-            curve.residual = self.residual_at(&self.thread_residual, &at, places);
         }
         curve.defect().map_or(Ok(curve), |e| Err(PredictError::Curve(e)))
-    }
-
-    /// Returns a residual of this method at a position of groups; `None` without groups.
-    fn residual_at(&self, groups: &[GroupResidual], at: &[f64], places: &Arc<Places>) -> Option<Residual> {
-        let weights = GroupResidual::weights_at(groups, at);
-        (!weights.is_empty()).then(|| Residual::new(Arc::clone(places), weights, self.residual_by_motion))
     }
 }
 

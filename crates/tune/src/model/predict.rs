@@ -81,7 +81,7 @@ impl Model {
                 continue;
             }
             let work = check_gpus(hardware, backend).and_then(|()| self.work(method, hardware, backend, &mut works));
-            let curve = match work.and_then(|work| method.curve(work, hardware, backend, &self.places)) {
+            let curve = match work.and_then(|work| method.curve(work, hardware, backend)) {
                 Ok(curve) => curve,
                 Err(missing) => {
                     p.warnings.push(format!("{id} is left out: {missing}"));

@@ -1,7 +1,7 @@
 //! What the physical terms of a method leave unexplained, shared by groups of timings.
 //!
-//! A Gaussian process over the load for each group. Groups have the host's SIMD level or number of threads in common,
-//! and the more alike these are, the more alike the residuals. A new machine gets the weighted sum of all groups. Far
+//! A Gaussian process over the load for each group, a host's SIMD level: the more alike two levels are, the more alike
+//! their residuals. A new machine gets the weighted sum of all groups. Far
 //! from all loads of the training it is zero, and the physical terms alone hold.
 
 use super::PredictError;
@@ -12,16 +12,14 @@ use crate::hardware::{Hardware, ParameterId};
 /// below, with the regrets of the six hosts of the training in sight (`docs/limitations.md`).
 const SHARED_LN: f64 = 0.2;
 const ALIKE_LN: f64 = 0.15;
-/// Lengths over which groups are alike, in natural logarithms: of SIMD lanes or threads, and of a cold fork and join.
+/// Length over which groups are alike, in natural logarithms of SIMD lanes.
 const WIDTH_LENGTH: f64 = 0.7;
-const FORK_JOIN_LENGTH: f64 = 1.0;
 
 /// The residual of the groups that lie at one position.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub struct GroupResidual {
-    /// What the groups are compared by, natural logarithms over their lengths: SIMD lanes on one thread; number of
-    /// threads and cold fork and join on several; empty on GPUs.
+    /// What the groups are compared by: the natural logarithm of SIMD lanes over its length; empty on GPUs.
     pub at: Vec<f64>,
     /// A weight for each of [`Model::places`](super::Model::places).
     pub weights: Vec<f64>,
@@ -34,15 +32,6 @@ impl GroupResidual {
     /// When the machine lacks the number of SIMD lanes.
     pub fn of_one_thread(hardware: &Hardware) -> Result<Vec<f64>, PredictError> {
         Ok(vec![needed(hardware, ParameterId::SimdLanes)?.ln() / WIDTH_LENGTH])
-    }
-
-    /// Returns the position of work on `threads` threads of a machine.
-    ///
-    /// # Errors
-    /// When the machine lacks the time of a cold fork and join.
-    pub fn of_threads(hardware: &Hardware, threads: u32) -> Result<Vec<f64>, PredictError> {
-        let fork_join = needed(hardware, ParameterId::ForkJoinColdNs)?;
-        Ok(vec![f64::from(threads).ln() / WIDTH_LENGTH, fork_join.ln() / FORK_JOIN_LENGTH])
     }
 
     /// Returns the covariance of the residuals of two positions under the same load.
