@@ -10,11 +10,11 @@ use std::sync::Arc;
 /// Coordinates of a load. The last one counts only for algorithms that are cheaper if boxes move little.
 const COORDINATES: usize = 5;
 /// Length scale of each coordinate: the distance over which a residual keeps its height. The coordinates are base-2
-/// logarithms of objects, and of pairs, strip candidates and axis candidates an object, and [`Load::moved`]. Halving
-/// or doubling a length changes regrets by less than two fits of the same reports differ.
-const LENGTHS: [f64; COORDINATES] = [3.0, 3.0, 4.0, 6.0, 0.375];
-/// Pairs an object below which scenes count as alike.
+/// logarithms of objects, of pairs, strip candidates and axis candidates an object, and of [`Load::moved`].
+const LENGTHS: [f64; COORDINATES] = [3.0, 3.0, 4.0, 6.0, 2.5];
+/// Pairs an object, and [`Load::moved`], below which scenes count as alike.
 const FEW_PAIRS: f64 = 0.05;
+const LITTLE_MOVED: f64 = 0.005;
 /// Highest plausible weight or constant. Weights of similar places may be large with opposite signs.
 const MOST_LN: f64 = 1000.0;
 /// Base-2 logarithm of the exponent of the kernel, a rational quadratic: regrets equal those of a squared
@@ -192,7 +192,7 @@ fn coordinates_of(load: &Load, [fewest, most]: [f64; 2]) -> [f64; COORDINATES] {
         (load.pairs / n + FEW_PAIRS).log2(),
         (load.strip_candidates / n + 1.0).log2(),
         (load.axis_candidates / n + 1.0).log2(),
-        load.moved,
+        (load.moved + LITTLE_MOVED).log2(),
     ];
     std::array::from_fn(|k| figures[k] / LENGTHS[k])
 }

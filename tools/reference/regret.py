@@ -82,7 +82,7 @@ def coordinates(load, octaves):
         math.log2(load["pairs"] / n + 0.05) / 3,
         math.log2(load["strip_candidates"] / n + 1) / 4,
         math.log2(load["axis_candidates"] / n + 1) / 6,
-        load["moved"] / 0.375,
+        math.log2(load["moved"] + 0.005) / 2.5,
     )
 
 
