@@ -356,26 +356,39 @@ LONG = ("sapwise.pairs of float64", "rtree intersection_v")
 
 def python_sentence():
     of = [row for row in rows("python.csv") if (row["what"], row["boxes"]) == ("all pairs", "10000")]
-    named = ", ".join(f"{row['contestant']} {float(row['median_ns']) / 1e6:.3g} ms" for row in of if row["contestant"] not in LONG)
+    times = {row["contestant"]: float(row["median_ns"]) / 1e6 for row in of if row["contestant"] not in LONG}
+    named = ", ".join(f"{contestant} {time:.3g} ms" for contestant, time in times.items())
     return f"10 000 `uniform` boxes, medians: {named}. {caption('python.csv', '../')}\n"
 
 
 # Columns that the caption has, or that only the file has.
 NOT_SHOWN = (
-    "machine", "date", "frames", "steps", "samples", "avian3d", "bullet", "trees_p99_ms", "quartile_1_ms", "quartile_3_ms",
+    "machine", "date", "frames", "steps", "samples", "avian3d", "bullet", "trees_p99_ms", "quartile_1_ms",
+    "quartile_3_ms",
 )
+
+
+def shown(name):
+    """The rows of a file without the columns that are not shown, the deciles in one cell."""
+    for row in rows(name):
+        if "p90" in row:
+            row["p10"] += f"–{row.pop('p90')}"
+        yield {"p10–p90" if k == "p10" else k: v for k, v in row.items() if k not in NOT_SHOWN}
+
+
+# Pages of several files with the same columns.
+TOGETHER = {"web": ("web.csv", "web-probes.csv")}
 
 
 def small_pages():
     """A table of each small file that was measured."""
     for name in ("sizes", "builds", "memory", "c", "avian", "web"):
-        if (RESULTS / f"{name}.csv").exists():
-            kept = [{k: v for k, v in row.items() if k not in NOT_SHOWN} for row in rows(f"{name}.csv")]
-            yield (
-                f"{name}.md",
-                f"# {name.capitalize()}\n\n{table(list(kept[0]), [row.values() for row in kept])}\n"
-                f"{caption(f'{name}.csv', None)}\n",
-            )
+        files = [file for file in TOGETHER.get(name, (f"{name}.csv",)) if (RESULTS / file).exists()]
+        if files:
+            kept = [row for file in files for row in shown(file)]
+            captions = "\n".join(caption(file, None) + "\n" for file in files)
+            body = table(list(kept[0]), [row.values() for row in kept])
+            yield f"{name}.md", f"# {name.capitalize()}\n\n{body}\n{captions}"
 
 
 def sample():

@@ -37,6 +37,7 @@ c() { tools/c.sh bench; note c.csv c "medians over all frames"; }
 python() { tools/python.sh bench; note python.csv python "samples as in the file"; }
 avian() { tools/avian.sh bench; note avian.csv avian "medians over all steps"; }
 web() { tools/web.sh bench; note web.csv web "medians over all frames"; }
+probes() { tools/web.sh probes; note web-probes.csv probes "n = 20 probes"; }
 # The regret of the built-in model on the reports of this machine. It means something if the model has not seen them.
 heldout() {
   host
@@ -90,12 +91,12 @@ predict() {
 }
 
 if [ "${1:-}" != --splice ]; then
-  [ $# -gt 0 ] || set -- peers inline c python avian web heldout sizes builds memory predict
+  [ $# -gt 0 ] || set -- peers inline c python avian web probes heldout sizes builds memory predict
   for what; do
     case $what in
-    peers | gpu | inline | c | python | avian | web | heldout | sizes | builds | memory | predict) "$what" ;;
+    peers | gpu | inline | c | python | avian | web | probes | heldout | sizes | builds | memory | predict) "$what" ;;
     *)
-      echo "usage: tools/results.sh [--splice | peers gpu inline c python avian web heldout sizes builds memory predict]" >&2
+      echo "usage: tools/results.sh [--splice | peers gpu inline c python avian web probes heldout sizes builds memory predict]" >&2
       exit 2
       ;;
     esac
