@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Runs the tests that take minutes: the long soak, kills, every size on software GPUs, and the verbs that measure.
+# Runs the tests that take minutes, and are left out of `.ci/run`: the long soak, kills, the contract at its large sizes
+# and every level of instructions, every size on software GPUs, the verbs that measure, ThreadSanitizer on all its tests.
 #
 #     tools/long-tests.sh
 #
@@ -7,3 +8,4 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 cargo test --locked --features sapwise/long-tests,sapwise-gpu/long-tests,sapwise-tune/long-tests,sapwise-cli/long-tests
+tools/sanitize.sh threads
