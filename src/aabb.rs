@@ -13,6 +13,14 @@ use crate::error::{BoxDefect, Error};
 /// box is valid if no bound is NaN and no minimum lies above its maximum.
 ///
 /// With the feature `serde`, infinite bounds are the strings `inf` and `-inf` in formats for humans, such as JSON.
+///
+/// ```
+/// use sapwise::Aabb;
+///
+/// let unit = Aabb::new([0.0; 3], [1.0; 3]);
+/// assert_eq!(unit, Aabb::cube([0.5; 3], 0.5)); // centre and half the edge
+/// assert!(unit.overlaps(&Aabb::new([1.0; 3], [2.0; 3])));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::Pod, bytemuck::Zeroable))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -60,6 +60,13 @@ described! {
 pub(crate) const MOST_THREADS: u32 = 4096;
 
 /// The error of a text that is no algorithm.
+///
+/// ```
+/// use sapwise::AlgorithmId;
+///
+/// let error = "bvh".parse::<AlgorithmId>().unwrap_err();
+/// println!("{error}"); // the text, and what an algorithm looks like
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ParseIdError(String);
 

@@ -15,6 +15,13 @@ pub(crate) use fill::each_bit;
 pub(crate) use order::Sorter;
 
 /// The order in which a caller wants the pairs.
+///
+/// ```
+/// use sapwise::{PairOrder, Pairs};
+///
+/// let pairs = Pairs::with_order(PairOrder::Canonical);
+/// assert!(pairs.as_slice().is_empty()); // until the first frame
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum PairOrder {
     /// The order in which the algorithm finds them: the least work.

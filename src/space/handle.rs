@@ -8,6 +8,18 @@ use std::num::NonZeroU64;
 ///
 /// 64 bits: slot, then generation. Handles sort by slot. 0 is no handle, so `Option<Handle>` has 64 bits too. With the
 /// feature `serde`, a handle is this number. In memory it is a [`NonZeroU64`].
+///
+/// ```
+/// use sapwise::{Aabb, Body, Handle, Space};
+///
+/// let mut space = Space::new();
+/// let ball = space.insert(Aabb::cube([0.0; 3], 1.0), Body::default())?;
+/// let bits = ball.to_bits(); // for an engine that keeps integers
+/// assert_eq!(Handle::from_bits(bits), Some(ball));
+/// space.remove(ball)?;
+/// assert!(!space.contains(ball));
+/// # Ok::<(), sapwise::Error>(())
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(transparent)]

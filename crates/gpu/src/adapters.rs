@@ -7,6 +7,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 /// GPUs that were found or that the program gave, in the order of their numbers. A GPU is opened once for all clones.
+///
+/// ```
+/// use sapwise_gpu::Gpus;
+///
+/// for gpu in Gpus::find().identities() {
+///     println!("gpu{}: {}", gpu.index, gpu.name);
+/// }
+/// ```
 #[derive(Debug, Clone, Default)]
 pub struct Gpus {
     found: Vec<Arc<Found>>,

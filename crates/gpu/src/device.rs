@@ -16,6 +16,18 @@ use std::time::{Duration, Instant};
 const WAIT_LIMIT: Duration = Duration::from_secs(60);
 
 /// An open GPU. Clones share it.
+///
+/// ```
+/// use sapwise_gpu::Gpus;
+///
+/// let gpus = Gpus::find();
+/// if !gpus.is_empty() {
+///     let gpu = gpus.open(0)?;
+///     gpu.check()?; // whether it can still be used
+///     println!("{} bytes in a buffer", gpu.limits().max_buffer_size);
+/// }
+/// # Ok::<(), sapwise_gpu::GpuError>(())
+/// ```
 #[derive(Clone)]
 pub struct Gpu {
     shared: Arc<Shared>,

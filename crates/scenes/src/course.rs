@@ -3,6 +3,19 @@
 use crate::Scenario;
 
 /// A scene of which a frame may have fewer boxes, and which may make several steps a frame.
+///
+/// ```
+/// use sapwise_scenes::Course;
+///
+/// let course = Course::Fight;
+/// let mut scene = course.scenario().start(1000, 1);
+/// for frame in 0..250 {
+///     let boxes = &scene.boxes()[..course.boxes(frame, 1000)];
+///     assert_eq!(boxes.len(), 1000);
+///     (0..course.steps(frame)).for_each(|_| scene.advance());
+/// }
+/// assert_eq!(scene.frame(), 200 + 50 * 12);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Course {
     /// A menu of 40 boxes for 150 frames, then the level.

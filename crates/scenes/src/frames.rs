@@ -17,6 +17,19 @@ use sapwise::Aabb;
 const BOUNDS: u64 = 6;
 
 /// The boxes of each frame of a recorded stream.
+///
+/// ```
+/// use sapwise_scenes::{FrameWriter, Frames, Scenario};
+///
+/// let scene = Scenario::Uniform.start(100, 1);
+/// let mut file = Vec::new();
+/// let mut writer = FrameWriter::new(&mut file, 1, 100)?;
+/// writer.write(scene.boxes())?;
+/// writer.finish()?;
+/// let frames = Frames::parse(file.as_slice(), file.len() as u64)?; // or `Frames::read` with a path
+/// assert_eq!(frames.frame(0), scene.boxes());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frames {
     /// The boxes of all frames, one frame after the other.

@@ -4,6 +4,16 @@
 /// platform.
 ///
 /// For orders and draws; not for cryptography.
+///
+/// ```
+/// use sapwise_scenes::Random;
+///
+/// let mut random = Random::new(1);
+/// let mut order = random.shuffled(5);
+/// order.sort();
+/// assert_eq!(order, [0, 1, 2, 3, 4]);
+/// assert_eq!(Random::new(7).bits(), Random::new(7).bits());
+/// ```
 #[derive(Debug, Clone)]
 pub struct Random(u64);
 

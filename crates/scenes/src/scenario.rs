@@ -20,6 +20,14 @@ pub use scene::Scene;
 ///
 /// The scenes from [`Scenario::Parked`] on have few pairs and are hard all the same: each makes a common shortcut
 /// quadratic. Those from [`Scenario::Churn`] on are for tests and benchmarks; the usual plan of a probe has none.
+///
+/// ```
+/// use sapwise_scenes::Scenario;
+///
+/// let scenario: Scenario = "free-fall".parse()?;
+/// assert_eq!(scenario.start(1000, 1).boxes().len(), 1000);
+/// # Ok::<(), sapwise_scenes::UnknownScenario>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Scenario {

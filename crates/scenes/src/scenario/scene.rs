@@ -13,6 +13,15 @@ use sapwise::Aabb;
 const STEP: f32 = 0.05;
 
 /// A scene in one of its frames.
+///
+/// ```
+/// use sapwise_scenes::Scenario;
+///
+/// let mut scene = Scenario::Gravity.start(500, 1);
+/// let before = scene.boxes().to_vec();
+/// scene.advance();
+/// assert_ne!(scene.boxes(), before);
+/// ```
 #[derive(Debug, Clone)]
 pub struct Scene {
     scenario: Scenario,
