@@ -64,10 +64,11 @@ fi
 
 export SAPWISE_NPM=$out/npm SAPWISE_REPORT=$out/web-report.json
 node --test bindings/web/tests/node/*.test.mjs
-# As a user of three.js installs both.
+# As a user of three.js installs both: what npm publishes, in a folder of its own.
+packed=$out/$(cd "$out/npm" && npm pack --silent --pack-destination "$out")
 rm -rf "$out/three"
 cp -r bindings/web/examples/three "$out/three"
-(cd "$out/three" && npm install --no-audit --no-fund --silent "$out/npm" && npm test --silent)
+(cd "$out/three" && npm install --no-audit --no-fund --silent "$packed" && npm test --silent)
 usual run --quiet --locked -- check "$SAPWISE_REPORT"
 if [ "$what" = browser ]; then
     SAPWISE=$out/debug/sapwise node bindings/web/tests/browser/run.mjs "$out/web"
