@@ -19,9 +19,12 @@ use std::path::Path;
 
 pub(super) fn run(folder: &Path, arguments: &Predict, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
     let Some(out) = arguments.out.as_deref().filter(|_| !arguments.json) else {
-        let why = "the reports of a folder may be of several kinds of machines: name a folder for their tunings with \
-                   --out, without --json";
-        return Err(WrongUsage(why.to_owned()).into());
+        let why = format!(
+            "{} is a folder, which may hold several machines: name a report in it, or a folder for one tuning a machine \
+             with --out, without --json",
+            folder.display()
+        );
+        return Err(WrongUsage(why).into());
     };
     if out.canonicalize().is_ok_and(|out| folder.canonicalize().is_ok_and(|folder| folder == out)) {
         let why = format!("{} holds the reports; name another folder for the tunings", out.display());

@@ -176,7 +176,7 @@ pub fn read_text(path: &Path) -> anyhow::Result<String> {
     String::from_utf8(bytes).map_err(|e| {
         let at = e.utf8_error().valid_up_to();
         let line = e.as_bytes()[..at].iter().filter(|&&b| b == b'\n').count() + 1;
-        anyhow::anyhow!("{shown} is no text: line {line} is not UTF-8 from byte {at} of the file on")
+        anyhow::anyhow!("{shown} is no text; name a JSON file: line {line} is not UTF-8 from byte {at} of the file on")
     })
 }
 

@@ -22,14 +22,14 @@ pub enum NpyError {
     /// The system can't open or read the file.
     #[error(transparent)]
     Io(#[from] io::Error),
-    /// A pipe or a device, which has no size and may never end.
-    #[error("it is no regular file")]
+    /// A folder, or a pipe or a device, which has no size and may never end.
+    #[error("it is a folder, a pipe or a device; name a .npy file")]
     NotAFile,
     /// The file is empty.
-    #[error("the file is empty")]
+    #[error("the file is empty; copy or make it again")]
     Empty,
     /// Another format.
-    #[error("it is no .npy file: the first bytes aren't \\x93NUMPY")]
+    #[error("it is no .npy file: the first bytes aren't \\x93NUMPY; save it with numpy.save")]
     NotNpy,
     /// The file ends before its data begin.
     #[error("the file ends within its header")]
