@@ -65,7 +65,8 @@ impl Default for Membership {
 /// - `bvh` and `pair-cache` test memberships in the nodes of their tree: they find no unwanted pair.
 /// - `brute` and `grid-sap` compare no two boxes of one set of which no two are wanted as a pair: all fixed boxes, or a
 ///   crowd that collides only with sensors. They drop other unwanted pairs as they find them.
-/// - `sap` and GPUs drop every unwanted pair as they find it. A GPU gets a changed filter once, 16 bytes for each box.
+/// - `sap` and GPUs drop every unwanted pair as they find it. A GPU gets a changed filter once, 16 bytes for each
+///   membership.
 ///
 /// A filter takes 17 bytes for each box. `bvh` and `pair-cache` take 17 more for each box if that set alone does not
 /// rule out all unwanted pairs. The first frame after a change of the filter finds that set in one pass over the

@@ -166,7 +166,6 @@ impl Space {
             neighbours: Neighbours::default(),
             tree: OnceLock::new(),
             links: Links::default(),
-            // So that the first fixed bodies rest at once.
             update: 0,
             rests: false,
             keys: Vec::new(),

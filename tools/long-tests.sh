@@ -7,5 +7,9 @@
 # Has not passed as a whole yet since the packages were split (2026-11-26).
 set -euo pipefail
 cd "$(dirname "$0")/.."
+gpus=$(tools/software-gpus.sh)
+eval "$gpus"
+export SAPWISE_REQUIRE_GPU=1
 cargo test --locked --features sapwise/long-tests,sapwise-gpu/long-tests,sapwise-tune/long-tests,sapwise-cli/long-tests
 tools/sanitize.sh threads
+tools/python.sh gpu

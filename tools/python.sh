@@ -74,6 +74,7 @@ test)
     run
     ;;
 gpu)
+    PYO3_PYTHON=$folder/tools/bin/python cargo clippy --quiet --manifest-path bindings/python/Cargo.toml --features gpu --locked -- -D warnings
     wheel --features gpu
     # The same module under another name: only one of the two wheels is installed.
     pip "$folder/tools" wheel

@@ -61,6 +61,11 @@ impl Active {
         self.patience[at] = Patience::after(update, (2 * self.patience[at].wait).max(1));
     }
 
+    /// Lets no body rest before this update.
+    pub(super) fn stay_until(&mut self, update: u64) {
+        self.patience.iter_mut().for_each(|patience| patience.until = patience.until.max(update));
+    }
+
     /// Writes the membership of a body to the filter.
     pub(super) fn set_body(&mut self, at: usize, body: &Body) {
         let membership = body.membership;

@@ -85,8 +85,11 @@ impl Neighbours {
                     neighbours.extend(near);
                 } else {
                     near.fat = fat(b);
-                    let mut add = |slot| neighbours.push(neighbour(slot));
-                    resting.overlapping(&near.fat, |slot| wants(at, slot).then(|| add(slot)).unwrap_or_default());
+                    resting.overlapping(&near.fat, |slot| {
+                        if wants(at, slot) {
+                            neighbours.push(neighbour(slot));
+                        }
+                    });
                 }
                 (near.first, near.len, near.epoch) = (first, (neighbours.len() - first) as u32, epoch);
             }

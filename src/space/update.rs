@@ -47,8 +47,12 @@ impl Space {
         if self.before.len() > known {
             self.sorter.sort(&Workers::one(), &mut self.before);
         }
-        self.find()?;
-        self.compare()?;
+        if let Err(error) = self.find().and_then(|()| self.compare()) {
+            // Their lists missed who came to rest, and nobody rests before the pairs of where it is now are known.
+            self.neighbours.clear();
+            self.active.stay_until(self.update + 2);
+            return Err(error);
+        }
         self.slots.free();
         Ok(())
     }

@@ -89,12 +89,21 @@ pub(crate) fn registry(threads: Option<u32>) -> Registry {
     registry
 }
 
-/// Adds the algorithms on GPUs of these kinds. The GPUs are found once.
+/// Adds the algorithms on GPUs of these kinds. The GPUs are found once in each process.
 #[cfg(feature = "gpu")]
 fn with_gpus(mut registry: Registry, wanted: impl Fn(sapwise_gpu::GpuKind) -> bool) -> Registry {
-    static FOUND: std::sync::OnceLock<sapwise_gpu::Gpus> = std::sync::OnceLock::new();
-    let gpus = FOUND.get_or_init(sapwise_gpu::Gpus::find).choose(|gpu| wanted(gpu.kind));
-    sapwise_gpu::add_to(&mut registry, &gpus);
+    static FOUND: std::sync::Mutex<Option<(u32, sapwise_gpu::Gpus)>> = std::sync::Mutex::new(None);
+    let mut found = FOUND.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let pid = std::process::id();
+    let gpus = match &*found {
+        Some((of, gpus)) if *of == pid => gpus.clone(),
+        _ => {
+            // After a fork. Dropping them would wait for a driver that is not in this process.
+            std::mem::forget(found.take());
+            found.insert((pid, sapwise_gpu::Gpus::find())).1.clone()
+        }
+    };
+    sapwise_gpu::add_to(&mut registry, &gpus.choose(|gpu| wanted(gpu.kind)));
     registry
 }
 

@@ -1,5 +1,5 @@
-// The filter on pairs. Two boxes are no pair unless each is in a group of the other's mask, unless one may move, and if
-// they have the same owner.
+// The filter on pairs. Each box of a pair is in a group of the other's mask, one of them may move, and their owners
+// differ unless they have none.
 
 // Groups, mask, owner (0: none), and 1 if the box is fixed, by the number of the box in the frame.
 @group(0) @binding(9) var<storage, read> memberships: array<vec4u>;
