@@ -105,7 +105,8 @@ impl Resident {
     /// number.
     ///
     /// Only the very first frame waits, for a sample of 256 boxes, and the first with a filter, for its kernels. Later
-    /// frames are planned for the [last](Self::last) frame that has arrived, with room for its pairs and a quarter more.
+    /// frames are planned for the [last](Self::last) frame that has arrived, with room for its pairs and a quarter
+    /// more.
     ///
     /// `sap` tests at most 32 768 candidates of a box in one submission, and 1024 in a frame of a million boxes. If a
     /// box has more, the frame is not [whole](SubmittedCounts::whole): use `grid-sap` or `bvh`.
