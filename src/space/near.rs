@@ -6,8 +6,8 @@ use crate::aabb::Aabb;
 /// Margin of a fat AABB, in mean edges of the body.
 const MARGIN: f32 = 0.25;
 
-/// Most bodies that may come to rest in an update without a search for each active body. Comparing with so many takes
-/// as long.
+/// If more bodies come to rest in an update, each active body searches for its neighbours anew. To compare it with this
+/// many takes as long as a search.
 const FEW: usize = 64;
 
 /// A resting body.
@@ -65,10 +65,11 @@ impl Neighbours {
         let Self { near, neighbours, waste } = self;
         let epoch = resting.epoch();
         let neighbour = |slot| Neighbour { aabb: boxes_at[slot as usize], slot };
-        let came = resting.arrived();
-        let arrived: Vec<Neighbour> = came.iter().take(FEW + 1).copied().map(neighbour).collect();
+        let arrived: Vec<Neighbour> = resting.arrived().iter().take(FEW + 1).copied().map(neighbour).collect();
         // Most slots are ruled out by a bit for each modulo 64.
-        let bits = came.iter().fold(0_u64, |bits, slot| bits | 1 << (slot % 64));
+        let bits = arrived.iter().fold(0_u64, |bits, one| bits | 1 << (one.slot % 64));
+        let came =
+            |slot: u32| bits & 1 << (slot % 64) != 0 && arrived.binary_search_by_key(&slot, |one| one.slot).is_ok();
         for (at, (near, b)) in near.iter_mut().zip(boxes).enumerate() {
             let stays = (0..3).all(|a| near.fat.min[a] <= b.min[a] && b.max[a] <= near.fat.max[a]);
             if !stays || near.epoch != epoch {
@@ -76,8 +77,6 @@ impl Neighbours {
                 *waste += known.len();
                 if stays && near.epoch + 1 == epoch && arrived.len() <= FEW {
                     // One that arrived may have been here before it woke.
-                    let came =
-                        |slot: u32| bits & 1 << (slot % 64) != 0 && resting.arrived().binary_search(&slot).is_ok();
                     for k in known {
                         neighbours.extend(Some(neighbours[k]).filter(|one| !came(one.slot)));
                     }

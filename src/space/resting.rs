@@ -21,7 +21,7 @@ pub(super) struct Resting {
     arrivals: Vec<u32>,
     /// Those that came in the last update.
     arrived: Vec<u32>,
-    /// Whether a body is among those of the last update: one bit for each slot.
+    /// Whether the body in a slot is among those of the last update: one bit each, so that all stay in the cache.
     bits: Vec<u64>,
     /// Number of bodies without the arrivals.
     len: usize,
@@ -135,7 +135,7 @@ impl Resting {
     }
 }
 
-/// Sets the bits of these slots among so many.
+/// Sets the bit of each of these slots. There are `slots` in all.
 fn mark(bits: &mut Vec<u64>, of: &[u32], slots: usize) {
     bits.resize(slots.div_ceil(64), 0);
     of.iter().for_each(|slot| bits[*slot as usize / 64] |= 1 << (slot % 64));

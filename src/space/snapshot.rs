@@ -48,7 +48,7 @@ struct Held {
 enum Stage {
     /// Inserted since.
     New,
-    /// May rest after so many more updates; the second number is [`Patience::wait`].
+    /// The number of updates until it may rest, and its [`Patience::wait`].
     Active(u64, u64),
     Resting,
 }

@@ -81,7 +81,7 @@ impl Start {
     }
 }
 
-/// Returns the algorithms to choose from on so many threads. `None`: all usable cores.
+/// Returns the algorithms to choose from, on up to this many threads. `None`: one for each usable core.
 pub(crate) fn registry(threads: Option<u32>) -> Registry {
     let registry = threads.map_or_else(Registry::new, Registry::with_cores);
     #[cfg(feature = "gpu")]
