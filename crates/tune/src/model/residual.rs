@@ -1,8 +1,8 @@
 //! What the physical terms of a method leave unexplained, shared by groups of timings.
 //!
 //! A Gaussian process over the load for each group, a host's SIMD level: the more alike two levels are, the more alike
-//! their residuals. A new machine gets the weighted sum of all groups. Far from all loads of the training it is zero, and
-//! the physical terms alone hold.
+//! their residuals. A new machine gets the weighted sum of all groups. Far from all loads of the training it is zero,
+//! and the physical terms alone hold.
 
 use super::PredictError;
 use super::needed::needed;
