@@ -34,10 +34,15 @@ pub(crate) fn is_fine() -> bool {
     tick().is_some_and(|tick| tick <= FINE)
 }
 
+/// Returns the nanoseconds since then.
+pub(crate) fn elapsed_ns(since: Instant) -> f64 {
+    since.elapsed().as_nanos() as u64 as f64
+}
+
 /// Returns the nanoseconds since then, at least 1; `None` if the clock is too coarse to tell.
 pub(crate) fn measured_ns(since: Instant) -> Option<f64> {
-    let elapsed = since.elapsed();
-    tick().filter(|&tick| elapsed >= FEWEST_TICKS * tick).map(|_| (elapsed.as_nanos() as f64).max(1.0))
+    let ns = elapsed_ns(since);
+    tick().filter(|tick| ns >= (FEWEST_TICKS * *tick).as_nanos() as f64).map(|_| ns.max(1.0))
 }
 
 /// Replaces the standard library's clock, which traps in WebAssembly without a system. A crate that asks a browser

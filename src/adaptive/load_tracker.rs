@@ -3,9 +3,9 @@
 use super::epoch::Epoch;
 use super::pace::{Pace, SHARE_OF_DRIFT, drift};
 use crate::aabb::Aabb;
-use crate::clock::Instant;
 #[cfg(test)]
 use crate::clock::counted;
+use crate::clock::{Instant, elapsed_ns};
 use crate::load::{Displacement, FramePlan, Load, Motion, is_same_pace};
 
 /// Share of the frames' time that samples may take, and that looks at the motion may take.
@@ -88,7 +88,7 @@ impl LoadTracker {
             (self.load, plan) = Load::planned(boxes, pairs, self.motion);
             #[cfg(test)]
             counted::spend(counted::sample_ns(boxes.len()));
-            spent_ns = started.elapsed().as_nanos() as f64;
+            spent_ns = elapsed_ns(started);
             self.sample_ns = capped(spent_ns, self.sample_ns);
             self.want_motion();
             (self.sampled, self.age, self.since_sample_ns) = (Some(objects), 0, 0.0);
@@ -119,7 +119,7 @@ impl LoadTracker {
         #[cfg(test)]
         counted::spend(counted::LOOK_NS);
         // To remember the boxes takes about as long as to compare them.
-        self.look_ns = capped(2.0 * started.elapsed().as_nanos() as f64, self.look_ns);
+        self.look_ns = capped(2.0 * elapsed_ns(started), self.look_ns);
         let same = self.motion.zip(motion).is_some_and(|(before, now)| is_same_pace(before.moved, now.moved));
         (self.motion, self.since_look_ns, self.watch) = (motion, 0.0, Watch::Resting);
         !same

@@ -188,7 +188,7 @@ impl Runner {
             spent_ns
         };
         self.measured_ns = None;
-        let took_ns = (started.elapsed().as_nanos() as f64 - spent_ns).max(0.0);
+        let took_ns = (clock::elapsed_ns(started) - spent_ns).max(0.0);
         self.tracker.pace.decided(count(boxes), took_ns);
         self.policy.decisions_take(self.tracker.pace.decision_ns);
     }

@@ -5,7 +5,6 @@
 
 use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, check_count};
-use crate::clock::Instant;
 use crate::cpu::Threads;
 use crate::cpu::level::Simd;
 use crate::cpu::outputs::Outputs;
@@ -45,10 +44,7 @@ impl BroadPhase for Bvh {
         let Self { workers, tree, upkeep, outputs } = self;
         let workers = &workers.fit(boxes.len());
         let _frame = workers.frame();
-        upkeep.update(tree, workers, boxes, || plan.stats(boxes), pairs.screen())?;
-        let started = Instant::now();
-        outputs.find(workers, pairs, |k, parts, list| tree.self_pairs(k, parts, list));
-        upkeep.searched(started, boxes.len());
+        upkeep.find(tree, workers, (plan, boxes), outputs, pairs)?;
         pairs.finish_on(workers)
     }
 

@@ -17,7 +17,7 @@ mod tree;
 
 use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, FrameKind, FrameWork, check_count};
-use crate::clock::Instant;
+use crate::clock::{Instant, elapsed_ns};
 use crate::cpu::Threads;
 use crate::cpu::level::Simd;
 use crate::cpu::outputs::Outputs;
@@ -107,13 +107,11 @@ impl BroadPhase for PairCache {
         check_count(boxes.len())?;
         self.fit(boxes.len());
         let _frame = self.workers.frame();
-        let started = Instant::now();
-        let each = |since: Instant| since.elapsed().as_nanos() as f32 / boxes.len().max(1) as f32;
         let kept = match self.motion.advise(plan, boxes) {
             None => Kept::Incomplete,
             Some(margin) => {
                 self.upkeep.forget();
-                let kept = self.keep(plan, boxes, margin, pairs, || each(started));
+                let kept = self.keep(plan, boxes, margin, pairs);
                 if kept != Ok(Kept::Pays) {
                     // The grown boxes may be half of this frame and half of the previous one.
                     self.grown.forget();
@@ -129,13 +127,8 @@ impl BroadPhase for PairCache {
         if kept == Kept::Incomplete {
             pairs.clear();
             let Self { workers, tree, upkeep, outputs, .. } = self;
-            // Without the time that keeping took in vain.
-            let started = Instant::now();
-            upkeep.update(&mut tree.tree, workers, boxes, || plan.stats(boxes), pairs.screen())?;
-            let searching = Instant::now();
-            outputs.find(workers, pairs, |k, parts, list| tree.tree.self_pairs(k, parts, list));
-            upkeep.searched(searching, boxes.len());
-            self.motion.found_from_scratch(boxes.len(), pairs.overlapping(), each(started));
+            let took = upkeep.find(&mut tree.tree, workers, (plan, boxes), outputs, pairs)?;
+            self.motion.found_from_scratch(boxes.len(), pairs.overlapping(), took as f32);
             self.last_frame = FrameKind::FromScratch;
         } else {
             self.motion.found(boxes.len(), pairs.overlapping());
@@ -193,15 +186,9 @@ impl PairCache {
         self.kept.resize_with(tasks * boxes.div_ceil(tasks * BOXES_PER_LIST).max(1), Pairs::new);
     }
 
-    /// Finds the pairs among the kept ones. `took` returns the nanoseconds since the frame began, for each box.
-    fn keep(
-        &mut self,
-        plan: &FramePlan,
-        boxes: &[Aabb],
-        margin: Margin,
-        pairs: &mut Pairs,
-        took: impl Fn() -> f32,
-    ) -> Result<Kept, Error> {
+    /// Finds the pairs among the kept ones.
+    fn keep(&mut self, plan: &FramePlan, boxes: &[Aabb], margin: Margin, pairs: &mut Pairs) -> Result<Kept, Error> {
+        let started = Instant::now();
         let Self { workers, outputs, motion, grown, tree, shares, kept, last_frame, .. } = self;
         let workers = &*workers;
         let shares = &mut shares[..workers.tasks()];
@@ -250,7 +237,8 @@ impl PairCache {
         let kept_pairs: usize = kept.iter().map(Pairs::len).sum();
         let most_kept = motion.most_kept(boxes.len());
         let did = Work { kept_pairs, nodes: looked.into_inner(), rebuilt };
-        let pays = motion.learn(boxes.len(), &changes, &did, took());
+        let took = elapsed_ns(started) as f32 / boxes.len().max(1) as f32;
+        let pays = motion.learn(boxes.len(), &changes, &did, took);
         Ok(match (kept_pairs <= most_kept && kept.iter().all(Pairs::is_complete), pays) {
             (false, _) => Kept::Incomplete,
             (true, false) => Kept::CostsMore,

@@ -47,6 +47,10 @@ const PROMISED: f32 = 16.0;
 /// Frames after which keeping has paid: when it ceases to, that is because the scene changed.
 const PROVEN: u32 = 256;
 
+/// Frames from scratch between two looks at whether keeping would pay, at most. A look at 100 boxes takes a tenth of a
+/// frame.
+const MOST_PAUSE: u32 = 7;
+
 /// Nodes of a tree that are looked at for a box, before any was counted.
 const NODES: f32 = 12.0;
 
@@ -69,6 +73,9 @@ pub(super) struct Motion {
     /// Pairs for each box in the last frame; `None` before the first.
     density: Option<f32>,
     keeping: Option<Keeping>,
+    /// Frames until the next look at whether keeping would pay, and after it if it would not.
+    pause: u32,
+    next_pause: u32,
     /// How far they move in this frame, where that was told.
     told: Option<f32>,
     /// No larger margin is begun with: that one kept too many pairs, of boxes near one another that do not overlap
@@ -147,6 +154,8 @@ impl Motion {
             displacement: Displacement::default(),
             density: None,
             keeping: None,
+            pause: 0,
+            next_pause: 0,
             told: None,
             most_margin: MARGINS[MARGINS.len() - 1],
             prices: Prices::new(timed, widths),
@@ -157,10 +166,26 @@ impl Motion {
     pub(super) fn advise(&mut self, plan: &FramePlan, boxes: &[Aabb]) -> Option<Margin> {
         self.told = plan.moved().map(|moved| moved as f32);
         if self.keeping.is_none() {
-            self.keeping = self.begin(plan, boxes);
-            self.displacement.watch(boxes);
+            self.look(plan, boxes);
         }
         self.keeping.map(|k| k.margin)
+    }
+
+    /// Begins to keep pairs if that promises to pay. Looks ever more rarely where it does not.
+    fn look(&mut self, plan: &FramePlan, boxes: &[Aabb]) {
+        if self.pause == 0 {
+            self.keeping = self.begin(plan, boxes);
+            self.prices.fade(1 + u64::from(self.next_pause));
+            (self.pause, self.next_pause) = match self.keeping {
+                Some(_) => (0, 0),
+                None => (self.next_pause, (2 * self.next_pause + 1).min(MOST_PAUSE)),
+            };
+        } else {
+            self.pause -= 1;
+        }
+        if self.pause == 0 {
+            self.displacement.watch(boxes);
+        }
     }
 
     /// Takes note of the pairs of a frame.
@@ -193,6 +218,7 @@ impl Motion {
     pub(super) fn missed(&mut self, frames: u64) {
         // Of boxes before all of these.
         self.displacement = Displacement::default();
+        (self.pause, self.next_pause) = (0, 0);
         self.prices.fade(frames);
     }
 

@@ -100,7 +100,6 @@ impl Prices {
             // The frame that builds is not counted.
             (self.lost, self.promised, self.kept) = (0.0, [keeping, scratch], [0.0, -1.0]);
         }
-        self.fade(1);
         begins
     }
 
@@ -178,7 +177,11 @@ mod tests {
         prices.failed(30.0, false);
         // Kept pairs cost 48 of these where 30 were promised.
         assert!(!prices.begins(30.0, 40.0) && !prices.begins(23.0, 40.0) && prices.clone().begins(22.0, 40.0));
-        let frames = (0..10_000).take_while(|_| !prices.begins(30.0, 40.0)).count();
+        let waits = |_: &u32| {
+            prices.fade(1);
+            !prices.begins(30.0, 40.0)
+        };
+        let frames = (0..10_000).take_while(waits).count();
         assert!((300..700).contains(&frames), "{frames}");
         prices.failed(30.0, true);
         assert!(!prices.begins(19.0, 40.0));

@@ -8,12 +8,14 @@
 
 use super::{Members, Tree};
 use crate::aabb::Aabb;
-use crate::clock::Instant;
+use crate::clock::{Instant, elapsed_ns};
 use crate::cpu::mean_time::MeanTime;
+use crate::cpu::outputs::Outputs;
 use crate::cpu::workers::Workers;
 use crate::error::Error;
 use crate::filter::Screen;
-use crate::load::SceneStats;
+use crate::load::{FramePlan, SceneStats};
+use crate::pairs::Pairs;
 
 /// Frames in which no refit is tried after one that was in vain, at most.
 const MOST_PAUSE: u32 = 64;
@@ -53,7 +55,7 @@ struct Known {
 
 /// Returns the nanoseconds since then, for each box.
 fn each_ns(since: Instant, boxes: usize) -> f64 {
-    since.elapsed().as_nanos() as f64 / boxes.max(1) as f64
+    elapsed_ns(since) / boxes.max(1) as f64
 }
 
 impl Upkeep {
@@ -73,7 +75,29 @@ impl Upkeep {
         self.tree = None;
     }
 
-    /// Refits or builds the tree of these boxes. `stats` returns their statistics.
+    /// Adds the pairs of these boxes to `pairs`, with a tree that is refitted or built. Returns the nanoseconds that
+    /// this took for each box.
+    ///
+    /// # Errors
+    /// Those of [`update`](Self::update), and of too many pairs.
+    pub(crate) fn find(
+        &mut self,
+        tree: &mut Tree,
+        workers: &Workers,
+        (plan, boxes): (&FramePlan, &[Aabb]),
+        outputs: &mut Outputs,
+        pairs: &mut Pairs,
+    ) -> Result<f64, Error> {
+        let updating = self.update(tree, workers, boxes, || plan.stats(boxes), pairs.screen())?;
+        let started = Instant::now();
+        outputs.find(workers, pairs, |k, parts, list| tree.self_pairs(k, parts, list));
+        let searching = each_ns(started, boxes.len());
+        self.search.add(searching);
+        Ok(updating + searching)
+    }
+
+    /// Refits or builds the tree of these boxes. `stats` returns their statistics. Returns the nanoseconds that this
+    /// took for each box, without those of a refit in vain.
     ///
     /// # Errors
     /// [`Error::InvalidBox`] for the first invalid box, and [`Error::OutOfMemory`].
@@ -84,29 +108,25 @@ impl Upkeep {
         boxes: &[Aabb],
         stats: impl Fn() -> SceneStats,
         screen: Option<&Screen>,
-    ) -> Result<(), Error> {
-        if self.refitted(tree, workers, boxes, &stats, screen) {
-            return Ok(());
+    ) -> Result<f64, Error> {
+        if let Some(refit) = self.refitted(tree, workers, boxes, &stats, screen) {
+            return Ok(refit);
         }
         self.tree = None;
         let started = Instant::now();
         let stats = stats();
         tree.build(workers, boxes, Members::From(0), &stats, screen)?;
-        self.build.add(each_ns(started, boxes.len()));
         #[cfg(test)]
         (self.builds += 1);
         let longest = (0..3).map(|a| stats.range(a).1).fold(0.0, f64::max) as f32;
         let area = tree.half_area(longest) / boxes.len().max(1) as f64;
         self.tree = Some(Known { boxes: boxes.len(), area, longest, excess: 0.0, sum: 0.0 });
-        Ok(())
+        let build = each_ns(started, boxes.len());
+        self.build.add(build);
+        Ok(build)
     }
 
-    /// Learns the time of a search.
-    pub(crate) fn searched(&mut self, since: Instant, boxes: usize) {
-        self.search.add(each_ns(since, boxes));
-    }
-
-    /// Refits the tree if that pays. If not, the tree is of no use.
+    /// Refits the tree if that pays, and returns the nanoseconds for each box. If not, the tree is of no use.
     fn refitted(
         &mut self,
         tree: &mut Tree,
@@ -114,20 +134,20 @@ impl Upkeep {
         boxes: &[Aabb],
         stats: impl Fn() -> SceneStats,
         screen: Option<&Screen>,
-    ) -> bool {
-        let Some(mut known) = self.tree else { return false };
+    ) -> Option<f64> {
+        let mut known = self.tree?;
         let price = self.price();
         if self.pause > 0 {
             self.pause -= 1;
-            return false;
+            return None;
         }
         // The next excess is hardly less than the last one.
         if known.sum + known.excess > price || boxes.is_empty() {
-            return false;
+            return None;
         }
         let started = Instant::now();
         if !tree.resize(workers, boxes, known.boxes, stats, screen) || !tree.refit(workers, boxes, screen) {
-            return false;
+            return None;
         }
         let area = tree.half_area(known.longest) / boxes.len() as f64;
         // NaN, of 0 over 0, counts as 0.
@@ -136,13 +156,14 @@ impl Upkeep {
         if in_vain {
             self.pause = self.next_pause;
             self.next_pause = (2 * self.next_pause + 1).min(MOST_PAUSE);
-            return false;
+            return None;
         }
-        self.refit.add(each_ns(started, boxes.len()));
+        let refit = each_ns(started, boxes.len());
+        self.refit.add(refit);
         self.next_pause = 0;
         (known.boxes, known.sum) = (boxes.len(), known.sum + known.excess);
         self.tree = Some(known);
-        true
+        Some(refit)
     }
 
     /// Returns what a build costs over a refit, in searches.
