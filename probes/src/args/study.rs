@@ -7,7 +7,7 @@ use std::path::PathBuf;
 ///
 /// DIR/index.html shows time over objects on the CPU and GPUs, the fields of the fastest algorithm, the regret of
 /// what is chosen on held-out hosts, the machines, and the influence of their parameters on the crossovers. Beside it
-/// are the figures as SVG, and timings.csv, crossovers.csv, regrets.csv and parameters.csv.
+/// are the figures as SVG, and timings.csv, crossovers.csv, regrets.csv, parameters.csv and influence.csv.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:

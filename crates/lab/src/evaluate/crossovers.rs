@@ -39,11 +39,20 @@ impl MeasuredCrossovers {
         Some(Self { scenario: scenario.to_owned(), loads, crossovers })
     }
 
-    /// Returns for each crossover whose algorithms have predicted costs the nearest crossing of those costs in the
-    /// same direction. If they don't cross so within the slice, it is the end beyond which they would: the upper one
-    /// if the algorithm below the crossover is predicted to be cheaper at it. The nearest number of threads stands in
-    /// for one that was not predicted.
+    /// Returns the crossovers.
+    pub(super) fn crossovers(&self) -> &[Crossover] {
+        &self.crossovers
+    }
+
+    /// Returns the [nearest](Self::nearest) predicted crossing of each crossover whose algorithms have predicted costs.
     pub(super) fn predicted(&self, costs: &[AlgorithmCost]) -> Vec<ComparedCrossover> {
+        self.crossovers.iter().filter_map(|b| self.nearest(b, costs)).collect()
+    }
+
+    /// Returns the nearest crossing of predicted costs in the same direction as a crossover. If they don't cross so
+    /// within the slice, it is the end beyond which they would: the upper one if the algorithm below the crossover is
+    /// predicted to be cheaper at it. The nearest number of threads stands in for one that was not predicted.
+    pub(super) fn nearest(&self, crossover: &Crossover, costs: &[AlgorithmCost]) -> Option<ComparedCrossover> {
         let ids: Vec<AlgorithmId> = costs.iter().map(|c| c.algorithm.clone()).collect();
         let cost = |id: &AlgorithmId| {
             let found = closest(id, &ids)?;
@@ -51,7 +60,7 @@ impl MeasuredCrossovers {
             // Under its own name, since one cost may stand in for both sides.
             Some(AlgorithmCost::new(id.clone(), cost.revision, cost.curve.clone(), cost.spread_ln))
         };
-        self.crossovers.iter().filter_map(|b| Some(self.compared(b, cost(&b.below)?, cost(&b.above)?))).collect()
+        Some(self.compared(crossover, cost(&crossover.below)?, cost(&crossover.above)?))
     }
 
     /// Returns the octaves between the two positions of each of them.

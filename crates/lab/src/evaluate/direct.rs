@@ -34,45 +34,21 @@ const GPU_PARAMETERS: [&str; 4] = [
 
 /// A method on one or all threads of its machine, or on one or all GPUs: every machine has these, whatever its counts.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Role {
+struct Role {
     class: BackendClass,
     method: String,
     /// All threads, or all GPUs; `false` if there is only one.
     all: bool,
 }
 
-impl std::fmt::Display for Role {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let units = match (self.class, self.all) {
-            (BackendClass::Cpu, false) => "one thread",
-            (BackendClass::Cpu, true) => "all threads",
-            (BackendClass::Gpu, false) => "one GPU",
-            (BackendClass::Gpu, true) => "all GPUs",
-        };
-        write!(f, "{} on {units}", self.method)
-    }
-}
-
 /// Which of two roles is cheaper at which sizes, on one machine.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct RoleOutcome {
-    pub(super) first: Role,
-    pub(super) second: Role,
+    first: Role,
+    second: Role,
     /// Ascending; none if one of the two is always cheaper.
     crossings: Vec<Crossing>,
     first_is_cheaper: bool,
-}
-
-impl RoleOutcome {
-    /// Natural logarithm of the objects at the last crossover, and whether the first is the cheaper one below it.
-    pub(super) fn last_crossover(&self) -> Option<(f64, bool)> {
-        self.crossings.last().map(|c| (c.objects.ln(), c.first_below))
-    }
-
-    /// The parameters that its crossover is regressed on.
-    pub(super) fn parameters(&self) -> [&'static str; 4] {
-        parameters(&self.first, &self.second)
-    }
 }
 
 fn parameters(a: &Role, b: &Role) -> [&'static str; 4] {
@@ -224,12 +200,12 @@ fn estimate(names: &[&str], machines: &[&Hardware], values: &[f64], hardware: &H
 
 /// A fitted linear function of a row of numbers.
 #[derive(Debug, Clone)]
-pub(super) struct Line {
-    pub(super) columns: Columns,
+struct Line {
+    columns: Columns,
     /// The value at the mean of every column.
-    pub(super) intercept: f64,
+    intercept: f64,
     /// One for each kept column, against its standardised numbers.
-    pub(super) slopes: Vec<f64>,
+    slopes: Vec<f64>,
 }
 
 impl Line {
@@ -238,7 +214,7 @@ impl Line {
     ///
     /// # Errors
     /// When linfa refuses the fit.
-    pub(super) fn least_squares(table: &Array2<f64>, values: &[f64]) -> Result<Self> {
+    fn least_squares(table: &Array2<f64>, values: &[f64]) -> Result<Self> {
         let columns = Columns::new(table, &vec![1.0; values.len()]);
         if values.len() <= columns.kept.len() + 1 {
             return Ok(Self::mean(table, values));
@@ -258,7 +234,7 @@ impl Line {
     }
 
     /// Returns the value at a row with as many numbers as the table has columns.
-    pub(super) fn at(&self, row: &[f64]) -> f64 {
+    fn at(&self, row: &[f64]) -> f64 {
         let c = &self.columns;
         let term = |j: usize| self.slopes[j] * (row[c.kept[j]] - c.centres[j]) / c.scales[j];
         self.intercept + (0..self.slopes.len()).map(term).sum::<f64>()

@@ -1,7 +1,6 @@
 //! Figures as SVG, drawn by plotters from plain data.
 
 mod curves;
-mod influence;
 mod map;
 mod ratios;
 mod replay;
@@ -13,7 +12,6 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 pub(crate) use curves::{Curve, CurvePanel, Curves, Field};
-pub(crate) use influence::Matrix;
 pub(crate) use map::{Cell, FieldMap, MapPanel};
 pub(crate) use ratios::Ratios;
 pub use replay::Replay;

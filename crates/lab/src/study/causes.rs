@@ -3,8 +3,8 @@
 use super::machines::PAPER;
 use super::{Material, Page, title};
 use crate::data::{COMPARED, Profile, is_real};
-use crate::evaluate::influences;
-use crate::figures::{Matrix, Ratios};
+use crate::evaluate::{Influence, influences};
+use crate::figures::Ratios;
 use crate::report::Label;
 use anyhow::Result;
 use sapwise::AlgorithmId;
@@ -16,8 +16,6 @@ use std::collections::BTreeMap;
 const FEWEST_POINTS: usize = 5;
 /// Objects from which on a frame counts for a speed-up.
 const LARGE: u32 = 1000;
-/// Crossovers that are shown at most.
-const MOST_CROSSOVERS: usize = 16;
 
 pub(super) fn section(material: &Material, page: &mut Page, files: &mut Vec<(&str, String)>) -> Result<()> {
     page.section("What parameters go with");
@@ -49,33 +47,34 @@ pub(super) fn section(material: &Material, page: &mut Page, files: &mut Vec<(&st
         }
         _ => page.lacks("Figures 10 and 11 for GPUs: it takes two GPUs; datasets/published holds those of the paper."),
     }
-    let mut found = influences(&material.profiles)?;
-    found.truncate(MOST_CROSSOVERS);
+    influence(material, page, files)
+}
+
+/// The table of influences.
+fn influence(material: &Material, page: &mut Page, files: &mut Vec<(&str, String)>) -> Result<()> {
+    let found = material.trained.as_ref().map(|t| influences(&material.profiles, &t.model)).unwrap_or_default();
     if found.is_empty() {
-        page.lacks(
-            "Influence on crossovers: no crossover was measured on three hosts and in more reports than parameters.",
-        );
+        page.lacks("Influence on crossovers: none was measured in three reports and moves with a parameter.");
         return Ok(());
     }
-    let mut columns: Vec<&str> = found.iter().flat_map(|i| &i.rises).map(|r| r.0).collect();
-    columns.sort_unstable();
-    columns.dedup();
-    let row = |i: &crate::evaluate::Influence| {
-        let of = |column: &&str| i.rises.iter().find(|r| r.0 == *column).map(|r| r.1);
-        (format!("{} ({} reports, {:.2})", i.crossover, i.reports, i.error_octaves), columns.iter().map(of).collect())
+    let octaves = |value: f64| format!("{value:+.2}");
+    let row = |i: &Influence| {
+        let (all, ends) = i.by_data.map_or((String::new(), None), |s| (octaves(s.all), s.without_one));
+        let ends = ends.map_or([String::new(), String::new()], |(low, high)| [octaves(low), octaves(high)]);
+        let decided = i.undecided.as_ref().map_or("yes".to_owned(), |why| format!("no: {why}"));
+        let [reports, hosts] = [i.reports, i.hosts].map(|n| n.to_string());
+        let head = [i.crossover.clone(), reports, hosts, i.parameter.clone(), octaves(i.by_model), all];
+        [&head[..], &ends, &[decided]].concat()
     };
-    let matrix = Matrix {
-        title: "Influence of parameters on crossovers, in octaves".to_owned(),
-        columns: columns.iter().map(|c| (*c).to_owned()).collect(),
-        rows: found.iter().map(row).collect(),
-    };
-    let svg = matrix.svg()?;
-    let caption = "Crossovers regressed on the logarithms of parameters by least squares. In parentheses the mean \
-                   error of the fit; in the cells how much it rises when the values of one parameter are exchanged \
-                   between reports, the mean over 30 permutations. An empty cell: the regression does not read that \
-                   parameter.";
-    page.figure("figure-11-influence.svg", &svg, caption);
-    files.push(("figure-11-influence.svg", svg));
+    let columns = "crossover reports hosts parameter model_octaves data_octaves data_least data_most decided";
+    let rows: Vec<Vec<String>> = found.iter().map(row).collect();
+    files.push(("influence.csv", super::csv::table(columns, rows.iter().cloned())?));
+    let head = columns.split(' ').map(|c| c.replace('_', " ")).collect();
+    let caption = "Octaves that a crossover moves up when a parameter doubles. Model: halved and doubled, median over \
+                   reports and scenarios. Data: least squares on the logarithm, each scenario with its own constant; \
+                   least and most with one host left out. Decided: whether these hosts can tell the parameter from \
+                   others. Parameters that the model moves it by under 0.1 octaves are left out.";
+    page.table(caption, &[vec![head], rows].concat());
     Ok(())
 }
 

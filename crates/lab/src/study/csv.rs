@@ -5,7 +5,7 @@ use anyhow::Result;
 use sapwise::algorithm::{Backend, BackendClass};
 
 /// Writes a table with these columns.
-fn table(columns: &str, mut rows: impl Iterator<Item = Vec<String>>) -> Result<String> {
+pub(super) fn table(columns: &str, mut rows: impl Iterator<Item = Vec<String>>) -> Result<String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(columns.split(' '))?;
     rows.try_for_each(|row| writer.write_record(row))?;

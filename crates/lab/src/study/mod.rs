@@ -144,7 +144,7 @@ impl Material {
     fn lead(&self) -> String {
         format!(
             "From {}: the timings of {} on {}. Sapwise {}. All tables are beside this page as CSV: timings.csv, \
-             crossovers.csv, regrets.csv and parameters.csv.",
+             crossovers.csv, regrets.csv, parameters.csv and influence.csv.",
             count(self.reports.len(), "report"),
             count(self.profiles.len(), "report"),
             count(data::machines(&self.profiles).len(), "host"),

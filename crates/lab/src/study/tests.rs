@@ -46,7 +46,7 @@ fn what_is_missing_is_said() {
     let reports = reports(folder.path(), &Machine::family()[..1]);
     let out = folder.path().join("study");
     let summary = study(std::slice::from_ref(&reports), &out, &Silent).unwrap();
-    for what in ["Figure 4", "Figure 6", "Nothing was held out", "Figure 9", "two hosts", "three hosts"] {
+    for what in ["Figure 4", "Figure 6", "Nothing was held out", "Figure 9", "two hosts", "three reports"] {
         assert!(summary.missing.iter().any(|m| m.contains(what)), "{what}: {:?}", summary.missing);
     }
     // A study is replaced; a folder of something else, and one that only looks like a study, is left alone.
