@@ -8,10 +8,12 @@ A document has blocks between `<!--NAME-->` and `<!--/NAME-->`; a number of a me
 come from results/provenance.csv. `tools/results.sh` measures. Needs Python 3.8 only.
 """
 
+import collections
 import csv
 import json
 import pathlib
 import re
+import statistics
 import sys
 
 sys.dont_write_bytecode = True
@@ -347,6 +349,49 @@ def page_of_heldout():
     )
 
 
+# --- What moves a crossover
+
+
+# How a cell of the column `decided` begins, and what it means.
+UNDECIDED = {
+    "varies": "the parameter is about the same on all hosts",
+    "goes with": "the parameter goes with another one",
+    "sign": "the sign rests on one host",
+    "1 host": "too few hosts have the crossover",
+    "2 hosts": "too few hosts have the crossover",
+    "not": "the parameter was not measured everywhere",
+}
+
+
+def influence():
+    found = rows("influence.csv")
+    body = [
+        [
+            row["crossover"],
+            f"`{row['parameter']}`",
+            row["model_octaves"],
+            "{data_octaves} ({data_least} to {data_most})".format(**row),
+        ]
+        for row in found
+        if row["decided"] == "yes"
+    ]
+    why = [row["decided"][len("no: ") :] for row in found if row["decided"] != "yes"]
+    reasons = collections.Counter(next(UNDECIDED[k] for k in UNDECIDED if text.startswith(k)) for text in why)
+    body += [[f"{count} more", "", "", f"undecided: {reason}"] for reason, count in reasons.most_common()]
+    by_model = {}
+    for row in found:
+        if row["crossover"].endswith("on a GPU"):
+            by_model.setdefault(row["parameter"], []).append(float(row["model_octaves"]))
+    largest = sorted(by_model, key=lambda name: -abs(statistics.median(by_model[name])))[:3]
+    named = ", ".join(f"`{name}` {statistics.median(by_model[name]):+.2f}" for name in largest)
+    return (
+        table(["crossover", "parameter", "model", "data"], body)
+        + f"\nOn crossovers from the CPU to a GPU, which one host has, the model's largest medians are {named}.\n\n"
+        + caption("influence.csv", "../")
+        + "\n"
+    )
+
+
 # --- Python and other bindings
 
 
@@ -410,6 +455,7 @@ def spliced():
         "docs/methodology.md": {
             "inline": inline_table() + "\n" + caption("inline.csv", "../") + "\n",
             "blind": blind_table() + "\n" + caption("heldout.csv", "../") + "\n",
+            "influence": influence(),
         },
         "docs/python.md": {"python": python_sentence()},
     }

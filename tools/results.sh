@@ -48,6 +48,12 @@ heldout() {
   done
   tools/reference/regret.py "$work" "datasets/$SAPWISE_HOST"/*.json
 }
+# Which parameter moves which crossover, from all reports. Measures nothing.
+influence() {
+  built
+  "$folder/release/sapwise" study datasets --out "$work/study" > "$work/study.txt"
+  mv "$work/study/influence.csv" results/influence.csv
+}
 # Bytes of what is shipped, stripped.
 sizes() {
   built
@@ -90,13 +96,15 @@ predict() {
   grep -v '^Next: ' "$work/predict.txt" > results/predict.txt
 }
 
+known="peers gpu inline c python avian web probes heldout influence sizes builds memory predict"
 if [ "${1:-}" != --splice ]; then
-  [ $# -gt 0 ] || set -- peers inline c python avian web probes heldout sizes builds memory predict
+  # shellcheck disable=SC2086
+  [ $# -gt 0 ] || set -- ${known/gpu /}
   for what; do
-    case $what in
-    peers | gpu | inline | c | python | avian | web | probes | heldout | sizes | builds | memory | predict) "$what" ;;
+    case " $known " in
+    *" $what "*) "$what" ;;
     *)
-      echo "usage: tools/results.sh [--splice | peers gpu inline c python avian web probes heldout sizes builds memory predict]" >&2
+      echo "usage: tools/results.sh [--splice | $known]" >&2
       exit 2
       ;;
     esac
