@@ -1,7 +1,7 @@
 //! The load of the next frame: from a sample now and then, scaled from the last one in between.
 
 use super::epoch::Epoch;
-use super::pace::{Pace, SHARE_OF_DRIFT, drift};
+use super::pace::{Pace, drift};
 use crate::aabb::Aabb;
 #[cfg(test)]
 use crate::clock::counted;
@@ -102,10 +102,8 @@ impl LoadTracker {
 
     fn is_sample_due(&self, objects: u32) -> bool {
         let Some(sampled) = self.sampled else { return true };
-        let drift = drift(objects, sampled);
-        let rested = self.age >= SAMPLE_EVERY || drift > DRIFTED;
-        let budget_ns = self.since_sample_ns * (SAMPLE_SHARE + SHARE_OF_DRIFT * drift);
-        rested && budget_ns >= self.sample_ns
+        let rested = self.age >= SAMPLE_EVERY || drift(objects, sampled) > DRIFTED;
+        rested && self.since_sample_ns * SAMPLE_SHARE >= self.sample_ns
     }
 
     /// Compares the boxes with the remembered ones of the previous frame, if there are any. Returns whether the pace

@@ -3,7 +3,7 @@
 /// Share of the frames' time that decisions may take, and by how much that rises with the [`drift`] of the objects
 /// since the last decision.
 const SHARE: f64 = 0.004;
-pub(super) const SHARE_OF_DRIFT: f64 = 0.02;
+const SHARE_OF_DRIFT: f64 = 0.02;
 /// Most frames between two decisions.
 const MOST_FRAMES: f64 = 1024.0;
 /// A jump in the number of objects calls for a decision at once: by more than this part of the previous frame's number,
