@@ -11,8 +11,13 @@ const FIRST_COUNTED: u32 = 3;
 /// one or two.
 const MOST_LOST: f32 = 4.0;
 
-/// One frame counts as at most this many from scratch: an interruption by the system says nothing.
+/// One frame counts as at most this many from scratch.
 const MOST_OF_FRAME: f32 = 4.0;
+
+/// A frame that takes this many times the mean one, with none such in so many frames before, was interrupted by the
+/// system, and counts as a mean one. On a busy host two of these within ten frames stopped keeping for 500.
+const INTERRUPTED: f32 = 2.0;
+const APART: u32 = 16;
 
 /// After a failure, keeping must promise to cost this many times less than finding from scratch.
 const WARY: f32 = 1.1;
@@ -38,6 +43,8 @@ pub(super) struct Prices {
     promised: [f32; 2],
     /// Sum and number of the frames since, without the first, which builds.
     kept: [f32; 2],
+    /// Frames since one took far longer than the mean one.
+    calm: u32,
 }
 
 /// What frames on one number of threads have shown.
@@ -61,7 +68,7 @@ impl Prices {
     /// For this many numbers of threads, of which the first is in use.
     pub(super) fn new(timed: bool, widths: usize) -> Self {
         let widths = vec![OfWidth::failed_by(1.0); widths];
-        Self { timed, widths, width: 0, lost: 0.0, promised: [0.0; 2], kept: [0.0; 2] }
+        Self { timed, widths, width: 0, lost: 0.0, promised: [0.0; 2], kept: [0.0; 2], calm: APART }
     }
 
     /// Goes on with another number of threads.
@@ -99,6 +106,7 @@ impl Prices {
         if begins {
             // The frame that builds is not counted.
             (self.lost, self.promised, self.kept) = (0.0, [keeping, scratch], [0.0, -1.0]);
+            self.calm = APART;
         }
         begins
     }
@@ -131,11 +139,21 @@ impl Prices {
             return keeping < scratch;
         }
         let scratch = scratch * self.of_scratch();
+        let mut took = took.min(MOST_OF_FRAME * scratch);
         self.kept[1] += 1.0;
         if self.kept[1] > 0.0 {
-            self.kept[0] += took.min(MOST_OF_FRAME * scratch);
+            let mean = match self.kept {
+                [sum, frames] if frames > 1.0 => sum / (frames - 1.0),
+                _ => self.promised[0] / self.promised[1] * scratch,
+            };
+            let stands_out = took > INTERRUPTED * mean;
+            if stands_out && self.calm >= APART {
+                took = mean;
+            }
+            self.calm = if stands_out { 0 } else { self.calm + 1 };
+            self.kept[0] += took;
         }
-        let over = (took / scratch).min(MOST_OF_FRAME) - 1.0;
+        let over = took / scratch - 1.0;
         // NaN, of 0 over 0, counts as 0.
         self.lost = (self.lost + over).max(0.0);
         self.lost <= MOST_LOST
@@ -160,12 +178,24 @@ mod tests {
         assert!((0..1000).all(|k| prices.pays(if k % 50 == 0 { 150.0 } else { 25.0 }, 10.0, 40.0)));
         // An interruption is no reason to stop, a tenth more in each frame is.
         assert!(prices.pays(5000.0, 10.0, 40.0));
-        assert!((0..10).all(|_| prices.pays(25.0, 10.0, 40.0)));
+        assert!((0..20).all(|_| prices.pays(25.0, 10.0, 40.0)));
         let frames = (0..1000).take_while(|_| prices.pays(55.0, 10.0, 40.0)).count();
         assert!((30..50).contains(&frames), "{frames}");
         // In a denser scene both cost more.
         assert!(prices.begins(60.0, 80.0));
         assert!((0..1000).all(|_| prices.pays(90.0, 60.0, 80.0)));
+    }
+
+    #[test]
+    fn interruptions_apart_are_no_reason_to_stop_and_frames_that_often_take_long_are() {
+        let frames = |every: u32| {
+            let mut prices = Prices::new(true, 1);
+            (0..10).for_each(|_| prices.add_scratch(50.0, 40.0));
+            assert!(prices.begins(30.0, 40.0) && prices.pays(200.0, 30.0, 40.0));
+            (0..1000).take_while(|k| prices.pays(if k % every == 0 { 5000.0 } else { 40.0 }, 30.0, 40.0)).count()
+        };
+        assert_eq!([frames(1000), frames(20)], [1000; 2]);
+        assert!(frames(10) < 50 && frames(2) < 10);
     }
 
     #[test]
