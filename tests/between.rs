@@ -2,15 +2,11 @@
 
 mod common;
 
-use common::{Random, naive_filtered, registries};
+use common::{Random, at_every_level, naive_filtered};
 use sapwise::{Aabb, Between, Error, Filter, Membership, PairOrder, Pairs};
 
-/// Returns a search at every SIMD level, on one thread and on two.
 fn every_search() -> Vec<(String, Between)> {
-    let of = |cores| {
-        registries(cores).map(move |(level, r)| (format!("{level}, {cores} threads"), Between::new(&r).unwrap()))
-    };
-    [1, 2].into_iter().flat_map(of).collect()
+    at_every_level(|registry| Between::new(registry).unwrap())
 }
 
 #[test]

@@ -2,13 +2,12 @@
 
 mod common;
 
-use common::{Random, WORLDS, denormals, every_algorithm, large_boxes, lattice, naive};
+use common::{Algorithms, Random, assert_each_names_the_first_invalid, every_algorithm, large_boxes, naive, scenes};
 use sapwise::algorithm::SimdLevel;
-use sapwise::error::BoxDefect;
-use sapwise::{Aabb, BroadPhase, Error, PairOrder, Pairs};
+use sapwise::{Aabb, Error, PairOrder, Pairs};
 use sapwise_scenes::Scenario;
 
-fn assert_all_agree(name: &str, boxes: &[Aabb], algorithms: &mut [(String, Box<dyn BroadPhase>)]) {
+fn assert_all_agree(name: &str, boxes: &[Aabb], algorithms: &mut Algorithms) {
     let expected = naive(boxes);
     for (id, algorithm) in algorithms {
         let mut canonical = Pairs::with_order(PairOrder::Canonical);
@@ -62,56 +61,11 @@ fn search_ends_soon_after_the_limit() {
 }
 
 #[test]
-fn worlds_of_every_shape() {
+fn boxes_of_every_kind() {
     let mut algorithms = every_algorithm();
-    let mut random = Random(7);
-    for world in WORLDS {
-        assert_all_agree("a world", &random.cubes(3000, world, 0.5), &mut algorithms);
+    for (name, boxes) in scenes(3000) {
+        assert_all_agree(name, &boxes, &mut algorithms);
     }
-    assert_all_agree("a world of denormals", &denormals(&mut random), &mut algorithms);
-}
-
-#[test]
-fn sorted_intervals_on_one_axis() {
-    let mut random = Random(13);
-    let mut starts: Vec<f32> = (0..3000).map(|_| (random.next() * 456_000.0).floor()).collect();
-    starts.sort_unstable_by(f32::total_cmp);
-    let mut intervals = vec![Aabb::flat([0.0; 2], [456_000.0, 0.0])];
-    intervals.extend(starts.iter().map(|&s| Aabb::flat([s, 0.0], [s + 100.0 + (random.next() * 2900.0).floor(), 0.0])));
-    assert_all_agree("intervals", &intervals, &mut every_algorithm());
-}
-
-#[test]
-fn boxes_on_a_lattice_touch_exactly() {
-    let mut algorithms = every_algorithm();
-    assert_all_agree("a lattice", &lattice(), &mut algorithms);
-}
-
-#[test]
-fn large_boxes_among_small_ones() {
-    let mut algorithms = every_algorithm();
-    assert_all_agree("large boxes", &large_boxes(), &mut algorithms);
-}
-
-#[test]
-fn clusters_and_outliers() {
-    let mut algorithms = every_algorithm();
-    let mut random = Random(5);
-    let mut boxes = Vec::new();
-    for _ in 0..6 {
-        let at = [random.next() * 500.0, random.next() * 500.0, random.next() * 500.0];
-        boxes.extend(
-            random
-                .cubes(500, [8.0; 3], 0.5)
-                .iter()
-                .map(|b| Aabb::new([0, 1, 2].map(|a| b.min[a] + at[a]), [0, 1, 2].map(|a| b.max[a] + at[a]))),
-        );
-    }
-    for far in [1.0e6, -1.0e9, 3.0e38] {
-        boxes.push(Aabb::cube([far, 0.0, far], 0.5));
-        boxes.push(Aabb::cube([0.0, far, 0.0], 1.0));
-    }
-    assert_all_agree("clusters", &boxes, &mut algorithms);
 }
 
 /// Fewer boxes do not keep seven threads busy.
@@ -129,54 +83,8 @@ fn scenes_for_seven_threads() {
 }
 
 #[test]
-fn infinite_and_empty_boxes_are_legal() {
-    let mut algorithms = every_algorithm();
-    let mut random = Random(3);
-    let inf = f32::INFINITY;
-    let mut boxes = random.cubes(1500, [20.0; 3], 0.5);
-    boxes.push(Aabb::new([-inf; 3], [inf; 3]));
-    boxes.insert(0, Aabb::new([-inf, 0.0, 0.0], [inf, 1.0, 1.0]));
-    boxes.push(Aabb::new([5.0, -inf, 5.0], [5.0, inf, inf]));
-    boxes.push(Aabb::new([inf; 3], [inf; 3]));
-    boxes.push(Aabb::new([-inf; 3], [-inf; 3]));
-    boxes.push(Aabb::new([f32::MIN; 3], [f32::MAX; 3]));
-    boxes.push(Aabb::new([-0.0; 3], [0.0; 3]));
-    boxes.push(Aabb::new([0.0; 3], [-0.0; 3]));
-    boxes.extend((0..50).map(|k| Aabb::cube([k as f32 * 0.25; 3], 0.0)));
-    assert_all_agree("infinite boxes", &boxes, &mut algorithms);
-    let lines: Vec<Aabb> = (0..600).map(|k| Aabb::new([-inf, k as f32, -inf], [inf, k as f32 + 1.0, inf])).collect();
-    assert_all_agree("infinite slabs", &lines, &mut algorithms);
-}
-
-#[test]
-fn identical_boxes_all_pair() {
-    let mut algorithms = every_algorithm();
-    assert_all_agree("identical boxes", &[Aabb::cube([3.0; 3], 1.0); 700], &mut algorithms);
-    assert_all_agree("identical points", &[Aabb::cube([3.0; 3], 0.0); 700], &mut algorithms);
-}
-
-#[test]
 fn the_first_invalid_box_is_named() {
-    let mut random = Random(11);
-    for (id, mut algorithm) in every_algorithm() {
-        let mut pairs = Pairs::new();
-        for at in [0, 1, 63, 64, 1000, 4999] {
-            for (defect, bad) in [
-                (BoxDefect::NotANumber, Aabb::new([0.0, 0.0, f32::NAN], [1.0; 3])),
-                (BoxDefect::NotANumber, Aabb::new([0.0; 3], [f32::NAN, 1.0, 1.0])),
-                (BoxDefect::Inverted, Aabb::new([0.0, 2.0, 0.0], [1.0; 3])),
-            ] {
-                let mut boxes = random.cubes(5000, [30.0; 3], 0.5);
-                boxes[at] = bad;
-                boxes[4999] = bad;
-                let error = algorithm.find_pairs(&boxes, &mut pairs).unwrap_err();
-                assert_eq!(error, Error::InvalidBox { index: at, defect }, "{id}");
-            }
-        }
-        let boxes = random.cubes(500, [10.0; 3], 0.5);
-        algorithm.find_pairs(&boxes, &mut pairs).unwrap();
-        assert_eq!(pairs.len(), naive(&boxes).len(), "{id} after errors");
-    }
+    assert_each_names_the_first_invalid(every_algorithm(), 5000, &[0, 1, 63, 64, 1000, 4999]);
 }
 
 #[test]

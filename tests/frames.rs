@@ -2,11 +2,11 @@
 
 mod common;
 
-use common::{Random, assert_each_finds, naive, registries};
+use common::{Algorithms, Random, assert_each_finds, naive, registries};
 use sapwise::{Aabb, BroadPhase, Error, PairOrder, Pairs, Registry};
 
 /// Returns every method on one and on three threads at every SIMD level of this machine.
-fn every_algorithm() -> Vec<(String, Box<dyn BroadPhase>)> {
+fn every_algorithm() -> Algorithms {
     let mut all = Vec::new();
     for (level, registry) in registries(3) {
         for id in registry.available().into_iter().map(|e| e.id) {
@@ -32,7 +32,7 @@ impl BroadPhase for Roaming {
     }
 }
 
-fn assert_all_agree(event: &str, boxes: &[Aabb], algorithms: &mut [(String, Box<dyn BroadPhase>)]) {
+fn assert_all_agree(event: &str, boxes: &[Aabb], algorithms: &mut Algorithms) {
     assert_each_finds(&naive(boxes), algorithms, boxes, &mut Pairs::with_order(PairOrder::Canonical), event);
 }
 
@@ -103,52 +103,35 @@ fn scene_far_from_the_origin() {
     }
 }
 
+/// Few boxes, and enough for an error in each part of several threads. Of the latter a third remains.
 #[test]
 fn frame_after_an_error_is_right() {
-    let mut random = Random(23);
-    for (id, mut algorithm) in every_algorithm() {
-        let mut boxes = random.cubes(500, [10.0; 3], 0.6);
-        let mut pairs = Pairs::with_order(PairOrder::Canonical);
-        for frame in 0..48 {
-            wander(&mut boxes, 0.04, &mut random);
-            if frame % 12 == 5 {
-                // The error names the lowest of them.
-                let mut wrong = boxes.clone();
-                wrong[123].max[1] = f32::NAN;
-                wrong[124].min[0] = 1.0e9;
-                wrong[400].min[2] = f32::NAN;
-                let error = algorithm.find_pairs(&wrong, &mut pairs).unwrap_err();
-                assert!(matches!(error, Error::InvalidBox { index: 123, .. }), "{id}: {error}");
+    for (count, side, step, period) in [(500, 10.0, 0.04, 12), (1500, 15.0, 0.02, 20)] {
+        let mut random = Random(23);
+        for (id, mut algorithm) in every_algorithm() {
+            let mut boxes = random.cubes(count, [side; 3], 0.6);
+            let mut pairs = Pairs::with_order(PairOrder::Canonical);
+            for frame in 0..60 {
+                wander(&mut boxes, step, &mut random);
+                if frame % period == 5 {
+                    // The error names the lowest of them.
+                    let mut wrong = boxes.clone();
+                    wrong[124].min[0] = 1.0e9;
+                    (70..wrong.len()).step_by(90).for_each(|k| wrong[k].max[1] = f32::NAN);
+                    let error = algorithm.find_pairs(&wrong, &mut pairs).unwrap_err();
+                    assert!(matches!(error, Error::InvalidBox { index: 70, .. }), "{id}: {error}");
+                    boxes.truncate(if period == 20 { boxes.len() / 3 } else { count });
+                }
+                if frame % period == 9
+                    && let Some(limit) = naive(&boxes).len().checked_sub(1)
+                {
+                    pairs.set_limit(Some(limit));
+                    assert_eq!(algorithm.find_pairs(&boxes, &mut pairs), Err(Error::TooManyPairs { limit }), "{id}");
+                    pairs.set_limit(None);
+                }
+                algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+                assert!(pairs.as_slice() == naive(&boxes), "{id}, frame {frame}");
             }
-            if frame % 12 == 9 {
-                let limit = naive(&boxes).len() - 1;
-                pairs.set_limit(Some(limit));
-                assert_eq!(algorithm.find_pairs(&boxes, &mut pairs), Err(Error::TooManyPairs { limit }), "{id}");
-                pairs.set_limit(None);
-            }
-            algorithm.find_pairs(&boxes, &mut pairs).unwrap();
-            assert!(pairs.as_slice() == naive(&boxes), "{id}, frame {frame}");
-        }
-    }
-}
-
-#[test]
-fn frame_after_errors_in_several_parts_is_right() {
-    let mut random = Random(31);
-    for (id, mut algorithm) in every_algorithm() {
-        let mut boxes = random.cubes(1500, [15.0; 3], 0.6);
-        let mut pairs = Pairs::with_order(PairOrder::Canonical);
-        for frame in 0..60 {
-            wander(&mut boxes, 0.02, &mut random);
-            if frame % 20 == 9 {
-                let mut wrong = boxes.clone();
-                (70..wrong.len()).step_by(90).for_each(|k| wrong[k].min[0] = f32::NAN);
-                let error = algorithm.find_pairs(&wrong, &mut pairs).unwrap_err();
-                assert!(matches!(error, Error::InvalidBox { index: 70, .. }), "{id}: {error}");
-                boxes.truncate(boxes.len() / 3);
-            }
-            algorithm.find_pairs(&boxes, &mut pairs).unwrap();
-            assert!(pairs.as_slice() == naive(&boxes), "{id}, frame {frame}");
         }
     }
 }

@@ -1,8 +1,10 @@
 //! Properties that hold for any boxes.
 
+mod common;
 #[path = "common/space.rs"]
 mod space;
 
+use common::naive;
 use proptest::prelude::*;
 use sapwise::algorithm::{Displacement, Load};
 use sapwise::tuning::Step;
@@ -41,15 +43,7 @@ proptest! {
 
     #[test]
     fn every_algorithm_finds_the_overlapping_pairs(boxes in prop::collection::vec(valid_box(), 0..600)) {
-        let mut expected = Vec::new();
-        for j in 0..boxes.len() {
-            for i in 0..j {
-                if boxes[i].overlaps(&boxes[j]) {
-                    expected.push((i as u32, j as u32));
-                }
-            }
-        }
-        expected.sort_unstable();
+        let expected = naive(&boxes);
         let (registry, ids) = registry();
         for id in ids {
             let mut pairs = Pairs::with_order(PairOrder::Canonical);

@@ -5,7 +5,7 @@ mod common;
 #[path = "common/space.rs"]
 mod space;
 
-use common::{Random, WORLDS, denormals, every_algorithm, lattice, naive_filtered};
+use common::{Random, WORLDS, assert_each_finds, denormals, every_algorithm, lattice, naive_filtered};
 use sapwise::{Aabb, BroadPhase, Filter, Membership, PairOrder, Pairs, Space};
 
 /// Boxes of a scene: more than any vector has lanes, and enough for a tree of several levels. Miri takes a second for
@@ -24,10 +24,7 @@ fn assert_frames_agree(name: &str, mut boxes: Vec<Aabb>, algorithms: &mut [(Stri
             let expected = naive_filtered(&boxes, &memberships);
             let mut pairs = Pairs::with_order(PairOrder::Canonical);
             pairs.set_filter((!memberships.is_empty()).then(|| Filter::new(memberships)));
-            for (id, algorithm) in &mut *algorithms {
-                algorithm.find_pairs(&boxes, &mut pairs).unwrap();
-                assert!(pairs.as_slice() == expected, "{id} on {name}, frame {frame}");
-            }
+            assert_each_finds(&expected, algorithms, &boxes, &mut pairs, &format!("{name}, frame {frame}"));
         }
         // One box in four, so that kept pairs are of use.
         for b in boxes.iter_mut().step_by(4) {

@@ -2,16 +2,12 @@
 
 mod common;
 
-use common::{Random, every_algorithm, naive_filtered, registries};
+use common::{Random, at_every_level, every_algorithm, naive_filtered};
 use sapwise::internals::Pair;
 use sapwise::{Aabb, Error, Filter, Membership, PairOrder, Pairs, Worlds};
 
-/// Returns [`Worlds`] at every SIMD level, on one thread and on two.
 fn every_search() -> Vec<(String, Worlds)> {
-    let of = |cores| {
-        registries(cores).map(move |(level, r)| (format!("{level}, {cores} threads"), Worlds::new(&r).unwrap()))
-    };
-    [1, 2].into_iter().flat_map(of).collect()
+    at_every_level(|registry| Worlds::new(registry).unwrap())
 }
 
 /// Returns the boxes of worlds of `counts` boxes, and the starts. Some boxes are large, infinite or appear twice.

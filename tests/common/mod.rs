@@ -2,8 +2,12 @@
 #![allow(dead_code, reason = "each test program uses a part of this")]
 
 use sapwise::algorithm::SimdLevel;
+use sapwise::error::BoxDefect;
 use sapwise::internals::Pair;
 use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Membership, Pairs, Registry};
+
+/// Algorithms with their names.
+pub(crate) type Algorithms = Vec<(String, Box<dyn BroadPhase>)>;
 
 /// The oracle: the definition of overlap, in a double loop.
 pub(crate) fn naive(boxes: &[Aabb]) -> Vec<Pair> {
@@ -55,8 +59,14 @@ pub(crate) fn registries(cores: u32) -> impl Iterator<Item = (SimdLevel, Registr
     })
 }
 
+/// Returns what `make` returns at every SIMD level, for one core and for two.
+pub(crate) fn at_every_level<T>(make: impl Fn(&Registry) -> T) -> Vec<(String, T)> {
+    let of = |cores| registries(cores).map(move |(level, registry)| (format!("{level}, {cores} threads"), registry));
+    [1, 2].into_iter().flat_map(of).map(|(name, registry)| (name, make(&registry))).collect()
+}
+
 /// Returns every method on 1, 2, 3 and 7 threads at every SIMD level of this machine.
-pub(crate) fn every_algorithm() -> Vec<(String, Box<dyn BroadPhase>)> {
+pub(crate) fn every_algorithm() -> Algorithms {
     let mut all = Vec::new();
     for (level, registry) in registries(7) {
         let ones = registry.entries().iter().filter(|e| e.id.threads() == 1);
@@ -96,8 +106,34 @@ pub(crate) fn assert_each_finds(
     what: &str,
 ) {
     for (id, algorithm) in algorithms {
-        algorithm.find_pairs(boxes, pairs).unwrap();
+        algorithm.find_pairs(boxes, pairs).unwrap_or_else(|e| panic!("{id}, {what}: {e}"));
         assert!(pairs.as_slice() == expected, "{id}, {what}: {} pairs, not {}", pairs.len(), expected.len());
+    }
+}
+
+/// Asserts that each algorithm names the first of two invalid boxes among `count`, the second of which is the last, and
+/// goes on.
+pub(crate) fn assert_each_names_the_first_invalid(algorithms: Algorithms, count: usize, places: &[usize]) {
+    let mut random = Random(11);
+    for (id, mut algorithm) in algorithms {
+        let mut pairs = Pairs::new();
+        for &at in places {
+            for (defect, bad) in [
+                (BoxDefect::NotANumber, Aabb::new([0.0, 0.0, f32::NAN], [1.0; 3])),
+                (BoxDefect::NotANumber, Aabb::new([0.0; 3], [f32::NAN, 1.0, 1.0])),
+                (BoxDefect::NotANumber, Aabb::new([f32::NAN; 3], [f32::NAN; 3])),
+                (BoxDefect::Inverted, Aabb::new([0.0, 2.0, 0.0], [1.0; 3])),
+                (BoxDefect::Inverted, Aabb::new([29.0; 3], [1.0; 3])),
+            ] {
+                let mut boxes = random.cubes(count, [30.0; 3], 0.5);
+                (boxes[at], boxes[count - 1]) = (bad, bad);
+                let error = algorithm.find_pairs(&boxes, &mut pairs).unwrap_err();
+                assert_eq!(error, Error::InvalidBox { index: at, defect }, "{id}");
+            }
+        }
+        let boxes = random.cubes(500, [10.0; 3], 0.5);
+        algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+        assert_eq!(pairs.len(), naive(&boxes).len(), "{id} after errors");
     }
 }
 
@@ -165,4 +201,52 @@ pub(crate) fn large_boxes() -> Vec<Aabb> {
         boxes.insert(k * 97, Aabb::new(at, [at[0] + size[0], at[1] + size[1], at[2] + size[2]]));
     }
     boxes
+}
+
+/// Returns scenes with their names: worlds of every shape with `count` boxes, and boxes of every kind that is legal.
+pub(crate) fn scenes(count: usize) -> Vec<(&'static str, Vec<Aabb>)> {
+    let mut random = Random(7);
+    let mut scenes: Vec<_> = WORLDS.map(|world| ("a world", random.cubes(count, world, 0.5))).into();
+    let inf = f32::INFINITY;
+    let mut starts: Vec<f32> = (0..3000).map(|_| (random.next() * 456_000.0).floor()).collect();
+    starts.sort_unstable_by(f32::total_cmp);
+    let mut intervals = vec![Aabb::flat([0.0; 2], [456_000.0, 0.0])];
+    intervals.extend(starts.iter().map(|&s| Aabb::flat([s, 0.0], [s + 100.0 + (random.next() * 2900.0).floor(), 0.0])));
+    let mut clusters = Vec::new();
+    for _ in 0..6 {
+        let at = [0; 3].map(|_| random.next() * 500.0);
+        let moved = |of: [f32; 3]| [0, 1, 2].map(|a| of[a] + at[a]);
+        let cubes = random.cubes(500, [8.0; 3], 0.5);
+        clusters.extend(cubes.iter().map(|b| Aabb::new(moved(b.min), moved(b.max))));
+    }
+    let mut infinite = large_boxes();
+    infinite.insert(0, Aabb::new([-inf, 0.0, 0.0], [inf, 1.0, 1.0]));
+    infinite.extend([
+        Aabb::new([-inf; 3], [inf; 3]),
+        Aabb::new([5.0, -inf, 5.0], [5.0, inf, inf]),
+        Aabb::new([inf; 3], [inf; 3]),
+        Aabb::new([-inf; 3], [-inf; 3]),
+        Aabb::new([f32::MIN; 3], [f32::MAX; 3]),
+        Aabb::new([-0.0; 3], [0.0; 3]),
+        Aabb::new([0.0; 3], [-0.0; 3]),
+    ]);
+    infinite.extend((0..50).map(|k| Aabb::cube([k as f32 * 0.25; 3], 0.0)));
+    for far in [1.0e6, -1.0e9, 3.0e38] {
+        let two = [Aabb::cube([far, 0.0, far], 0.5), Aabb::cube([0.0, far, 0.0], 1.0)];
+        infinite.extend(two);
+        clusters.extend(two);
+    }
+    let slab = |k: i32| Aabb::new([-inf, k as f32, -inf], [inf, k as f32 + 1.0, inf]);
+    scenes.extend([
+        ("a world of denormals", denormals(&mut random)),
+        ("a lattice", lattice()),
+        ("sorted intervals", intervals),
+        ("clusters and outliers", clusters),
+        ("large boxes", large_boxes()),
+        ("infinite boxes", infinite),
+        ("infinite slabs", (0..600).map(slab).collect()),
+        ("identical boxes", vec![Aabb::cube([3.0; 3], 1.0); 700]),
+        ("identical points", vec![Aabb::cube([3.0; 3], 0.0); 700]),
+    ]);
+    scenes
 }

@@ -5,13 +5,12 @@
 
 mod common;
 
-use common::{Random, WORLDS, denormals, gpus, large_boxes, lattice, naive, naive_filtered};
-use sapwise::error::BoxDefect;
+use common::{
+    Algorithms, Random, assert_each_finds, assert_each_names_the_first_invalid, gpus, naive, naive_filtered, scenes,
+};
 use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Filter, Membership, PairOrder, Pairs, Registry};
 use sapwise_gpu::{Gpus, broad_phase};
 use sapwise_scenes::Scenario;
-
-type Algorithms = Vec<(String, Box<dyn BroadPhase>)>;
 
 /// Returns the ids of the registry that are on GPUs.
 fn on_gpus(registry: &Registry) -> Vec<AlgorithmId> {
@@ -36,11 +35,7 @@ fn assert_all_agree(name: &str, boxes: &[Aabb], algorithms: &mut Algorithms) {
 }
 
 fn assert_all_find(expected: &[(u32, u32)], name: &str, boxes: &[Aabb], algorithms: &mut Algorithms) {
-    for (id, algorithm) in algorithms {
-        let mut canonical = Pairs::with_order(PairOrder::Canonical);
-        algorithm.find_pairs(boxes, &mut canonical).unwrap_or_else(|e| panic!("{id} on {name}: {e}"));
-        assert!(canonical.as_slice() == expected, "{id} on {name}: {} pairs, not {}", canonical.len(), expected.len());
-    }
+    assert_each_finds(expected, algorithms, boxes, &mut Pairs::with_order(PairOrder::Canonical), name);
 }
 
 /// Returns a frame with that many boxes.
@@ -79,40 +74,12 @@ fn every_scenario() {
 }
 
 #[test]
-fn worlds_of_every_shape() {
+fn boxes_of_every_kind() {
     let Some(gpus) = gpus() else { return };
     let mut algorithms = every_algorithm(&gpus);
-    let mut random = Random(7);
-    for world in WORLDS {
-        assert_all_agree("a world", &random.cubes(1500, world, 0.5), &mut algorithms);
+    for (name, boxes) in scenes(1500) {
+        assert_all_agree(name, &boxes, &mut algorithms);
     }
-    assert_all_agree("a world of denormals", &denormals(&mut random), &mut algorithms);
-    assert_all_agree("a lattice", &lattice(), &mut algorithms);
-}
-
-#[test]
-fn large_infinite_and_far_boxes() {
-    let Some(gpus) = gpus() else { return };
-    let mut algorithms = every_algorithm(&gpus);
-    let mut boxes = large_boxes();
-    assert_all_agree("large boxes", &boxes, &mut algorithms);
-    let inf = f32::INFINITY;
-    boxes.push(Aabb::new([-inf; 3], [inf; 3]));
-    boxes.insert(0, Aabb::new([-inf, 0.0, 0.0], [inf, 1.0, 1.0]));
-    boxes.push(Aabb::new([5.0, -inf, 5.0], [5.0, inf, inf]));
-    boxes.push(Aabb::new([inf; 3], [inf; 3]));
-    boxes.push(Aabb::new([-inf; 3], [-inf; 3]));
-    boxes.push(Aabb::new([f32::MIN; 3], [f32::MAX; 3]));
-    boxes.push(Aabb::new([-0.0; 3], [0.0; 3]));
-    boxes.push(Aabb::new([0.0; 3], [-0.0; 3]));
-    for far in [1.0e6, -1.0e9, 3.0e38] {
-        boxes.push(Aabb::cube([far, 0.0, far], 0.5));
-        boxes.push(Aabb::cube([0.0, far, 0.0], 1.0));
-    }
-    assert_all_agree("infinite boxes", &boxes, &mut algorithms);
-    let lines: Vec<Aabb> = (0..600).map(|k| Aabb::new([-inf, k as f32, -inf], [inf, k as f32 + 1.0, inf])).collect();
-    assert_all_agree("infinite slabs", &lines, &mut algorithms);
-    assert_all_agree("identical points", &[Aabb::cube([3.0; 3], 0.0); 700], &mut algorithms);
 }
 
 #[test]
@@ -160,10 +127,7 @@ fn filters_change_between_frames() {
             }
         }
         let expected = naive_filtered(&boxes, pairs.filter().map_or(&[], |filter| &filter.memberships));
-        for (id, algorithm) in &mut algorithms {
-            algorithm.find_pairs(&boxes, &mut pairs).unwrap_or_else(|e| panic!("{id} in frame {frame}: {e}"));
-            assert!(pairs.as_slice() == expected, "{id} in frame {frame}: {} pairs", pairs.len());
-        }
+        assert_each_finds(&expected, &mut algorithms, &boxes, &mut pairs, &format!("frame {frame}"));
     }
 }
 
@@ -193,27 +157,7 @@ fn few_of_millions_of_pairs_are_wanted() {
 #[test]
 fn the_first_invalid_box_is_named() {
     let Some(gpus) = gpus() else { return };
-    let mut random = Random(11);
-    for (id, mut algorithm) in every_algorithm(&gpus) {
-        let mut pairs = Pairs::new();
-        for at in [0, 127, 1000, 1499] {
-            for (defect, bad) in [
-                (BoxDefect::NotANumber, Aabb::new([0.0, 0.0, f32::NAN], [1.0; 3])),
-                (BoxDefect::NotANumber, Aabb::new([f32::NAN; 3], [f32::NAN; 3])),
-                (BoxDefect::Inverted, Aabb::new([0.0, 2.0, 0.0], [1.0; 3])),
-                (BoxDefect::Inverted, Aabb::new([29.0; 3], [1.0; 3])),
-            ] {
-                let mut boxes = random.cubes(1500, [20.0; 3], 0.5);
-                boxes[at] = bad;
-                boxes[1499] = bad;
-                let error = algorithm.find_pairs(&boxes, &mut pairs).unwrap_err();
-                assert_eq!(error, Error::InvalidBox { index: at, defect }, "{id}");
-            }
-        }
-        let boxes = random.cubes(500, [10.0; 3], 0.5);
-        algorithm.find_pairs(&boxes, &mut pairs).unwrap();
-        assert_eq!(pairs.len(), naive(&boxes).len(), "{id} after errors");
-    }
+    assert_each_names_the_first_invalid(every_algorithm(&gpus), 1500, &[0, 127, 1000, 1499]);
 }
 
 /// Two million pairs, or twelve with `long-tests`.
@@ -260,7 +204,7 @@ fn the_order_is_the_same_in_every_run() {
 #[cfg(feature = "long-tests")]
 mod long {
     use super::*;
-    use crate::common::swept;
+    use crate::common::{large_boxes, lattice, swept};
 
     #[test]
     fn the_oracle_of_large_frames_is_the_double_loop() {

@@ -139,41 +139,31 @@ fn a_revived_device_is_used_at_once() {
 
 #[test]
 fn a_gpu_that_does_not_answer_in_time_is_lost() {
-    let Some(gpus) = gpus() else { return };
-    let gpu = gpus.open_another(0).unwrap();
-    let mut algorithm = broad_phase("brute", vec![gpu.clone()]).unwrap();
-    let boxes = Random(3).cubes(100, [8.0; 3], 0.5);
-    gpu.set_wait_limit(std::time::Duration::from_millis(1));
-    occupy(&gpu);
-    let mut pairs = Pairs::new();
-    let error = algorithm.find_pairs(&boxes, &mut pairs).unwrap_err().to_string();
-    assert!(error.contains("did not answer within 1 ms"), "{error}");
-    assert!(algorithm.find_pairs(&boxes, &mut pairs).unwrap_err().to_string().contains("did not answer"));
-    drop(algorithm);
-    finish(&gpu);
-}
-
-#[test]
-fn the_wait_limit_applies_to_open_and_closed_gpus() {
     if gpus().is_none() {
         return;
     }
-    let boxes = Random(4).cubes(100, [8.0; 3], 0.5);
-    for opened_before in [false, true] {
+    let boxes = Random(3).cubes(100, [8.0; 3], 0.5);
+    let limit = std::time::Duration::from_millis(1);
+    for limited in ["the GPU", "opened GPUs", "GPUs to be opened"] {
         // A GPU that did not answer stays lost, so find it again.
         let gpus = Gpus::find();
-        let open = opened_before.then(|| gpus.open(0).unwrap());
-        // Clones share their GPUs.
-        gpus.clone().set_wait_limit(std::time::Duration::from_millis(1));
+        let opened = (limited != "GPUs to be opened").then(|| gpus.open(0).unwrap());
+        match &opened {
+            Some(gpu) if limited == "the GPU" => gpu.set_wait_limit(limit),
+            // Clones share their GPUs.
+            _ => gpus.clone().set_wait_limit(limit),
+        }
         let mut registry = Registry::with_cores(1);
         sapwise_gpu::add_to(&mut registry, &gpus);
         let mut algorithm = registry.create(&"brute@gpu0".parse().unwrap()).unwrap();
         // The GPU of the algorithm.
         let gpu = gpus.open(0).unwrap();
         occupy(&gpu);
-        let error = algorithm.find_pairs(&boxes, &mut Pairs::new()).unwrap_err().to_string();
-        assert!(error.contains("did not answer within 1 ms"), "opened before: {opened_before}: {error}");
-        drop((algorithm, open));
+        for text in ["did not answer within 1 ms", "did not answer"] {
+            let error = algorithm.find_pairs(&boxes, &mut Pairs::new()).unwrap_err().to_string();
+            assert!(error.contains(text), "{limited}: {error}");
+        }
+        drop((algorithm, opened));
         finish(&gpu);
     }
 }
