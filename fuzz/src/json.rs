@@ -49,47 +49,23 @@ fn damage(value: &mut Value, other: Value, random: &mut Random) {
         (Value::Object(keys), _) => drop(keys.insert(["schema", "made up", ""][random.below(3)].to_owned(), other)),
         (Value::String(text), 1 | 2) => *text = text.chars().rev().collect(),
         (Value::String(text), 3) => drop(text.pop()),
-        (Value::String(text), _) => *text = NAMES[random.below(NAMES.len())].to_owned(),
+        (Value::String(text), _) => *text = word(NAMES, random).to_owned(),
         (Value::Bool(flag), _) => *flag = !*flag,
         (value @ Value::Number(_), 1 | 2) => {
             *value = json!(value.as_f64().unwrap_or(1.0) * FACTORS[random.below(FACTORS.len())])
         }
-        (value, _) => *value = serde_json::from_str(NUMBERS[random.below(NUMBERS.len())]).unwrap_or_default(),
+        (value, _) => *value = serde_json::from_str(word(NUMBERS, random)).unwrap_or_default(),
     }
 }
 
 const FACTORS: [f64; 8] = [-1.0, 0.5, 2.0, 1.0e3, 1.0e-3, 1.0e12, 1.0e-12, 1.0 + f64::EPSILON];
 
-const NUMBERS: [&str; 14] = [
-    "0",
-    "1",
-    "-1",
-    "2",
-    "0.0",
-    "-0.0",
-    "1e308",
-    "-1e308",
-    "5e-324",
-    "4294967295",
-    "4294967296",
-    "18446744073709551615",
-    "1e999",
-    "null",
-];
+const NUMBERS: &str = "0 1 -1 2 0.0 -0.0 1e308 -1e308 5e-324 4294967295 4294967296 18446744073709551615 1e999 null";
 
-const NAMES: [&str; 14] = [
-    "",
-    "brute@cpu1",
-    "pair-cache@cpu2",
-    "grid-sap@gpu0+1",
-    "bvh@cpu4096",
-    "sap",
-    "call",
-    "cpu",
-    "gpu",
-    "uniform",
-    "tuning/3",
-    "tuning/3.7",
-    "model/5",
-    "report/3",
-];
+const NAMES: &str = " brute@cpu1 pair-cache@cpu2 grid-sap@gpu0+1 bvh@cpu4096 sap call cpu gpu uniform tuning/3 \
+                     tuning/3.7 model/5 report/3";
+
+/// Picks one of the words of a text, which are separated by one blank.
+fn word(text: &'static str, random: &mut Random) -> &'static str {
+    text.split(' ').nth(random.below(text.split(' ').count())).unwrap_or_default()
+}
