@@ -83,28 +83,34 @@ impl Start {
 
 /// Returns the algorithms to choose from, on up to this many threads. `None`: one for each usable core.
 pub(crate) fn registry(threads: Option<u32>) -> Registry {
-    let registry = threads.map_or_else(Registry::new, Registry::with_cores);
-    #[cfg(feature = "gpu")]
-    let registry = with_gpus(registry, |kind| kind != sapwise_gpu::GpuKind::Software);
+    with_gpus(threads, false)
+}
+
+/// Adds the algorithms on GPUs, and on software adapters too if `software`. They are found once in each process.
+#[cfg(feature = "gpu")]
+fn with_gpus(threads: Option<u32>, software: bool) -> Registry {
+    static FOUND: std::sync::Mutex<Option<(u32, sapwise_gpu::Gpus)>> = std::sync::Mutex::new(None);
+    let mut registry = on_cpu(threads);
+    let mut found = FOUND.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let pid = std::process::id();
+    if !matches!(&*found, Some((of, _)) if *of == pid) {
+        // After a fork. Dropping them would wait for a driver that is not in this process.
+        std::mem::forget(found.replace((pid, sapwise_gpu::Gpus::find())));
+    }
+    let wanted = |kind| software || kind != sapwise_gpu::GpuKind::Software;
+    if let Some((_, gpus)) = &*found {
+        sapwise_gpu::add_to(&mut registry, &gpus.choose(|gpu| wanted(gpu.kind)));
+    }
     registry
 }
 
-/// Adds the algorithms on GPUs of these kinds. The GPUs are found once in each process.
-#[cfg(feature = "gpu")]
-fn with_gpus(mut registry: Registry, wanted: impl Fn(sapwise_gpu::GpuKind) -> bool) -> Registry {
-    static FOUND: std::sync::Mutex<Option<(u32, sapwise_gpu::Gpus)>> = std::sync::Mutex::new(None);
-    let mut found = FOUND.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-    let pid = std::process::id();
-    let gpus = match &*found {
-        Some((of, gpus)) if *of == pid => gpus.clone(),
-        _ => {
-            // After a fork. Dropping them would wait for a driver that is not in this process.
-            std::mem::forget(found.take());
-            found.insert((pid, sapwise_gpu::Gpus::find())).1.clone()
-        }
-    };
-    sapwise_gpu::add_to(&mut registry, &gpus.choose(|gpu| wanted(gpu.kind)));
-    registry
+#[cfg(not(feature = "gpu"))]
+fn with_gpus(threads: Option<u32>, _: bool) -> Registry {
+    on_cpu(threads)
+}
+
+fn on_cpu(threads: Option<u32>) -> Registry {
+    threads.map_or_else(Registry::new, Registry::with_cores)
 }
 
 /// Makes an empty list of pairs. Without a limit, free memory limits it.
@@ -121,13 +127,8 @@ pub(crate) fn order(ordered: bool) -> PairOrder {
 
 /// Makes what always runs the algorithm of this name.
 pub(crate) fn only(name: &str, threads: Option<u32>) -> Result<Adaptive, Error> {
-    #[cfg_attr(not(feature = "gpu"), expect(unused_mut, reason = "there is nothing to add"))]
-    let mut registry = registry(threads);
-    // Who names an algorithm may want a software adapter.
-    #[cfg(feature = "gpu")]
-    if name.contains("@gpu") {
-        registry = with_gpus(registry, |_| true);
-    }
+    // Who names an algorithm may want a software adapter. On the CPU nobody waits for drivers.
+    let registry = if name.contains("@cpu") { on_cpu(threads) } else { with_gpus(threads, true) };
     let parsed = name.parse().map_err(|_| {
         let known: Vec<String> = registry.available().iter().map(|entry| entry.id.to_string()).collect();
         let method = |id: &&String| id.split('@').next() == Some(name);
