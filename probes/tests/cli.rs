@@ -2,9 +2,9 @@
 
 mod common;
 
-#[cfg(unix)]
-use common::send;
 use common::{answer, failure, npy, sapwise, small_report, success, without_adapters};
+#[cfg(unix)]
+use common::{program, send};
 use std::fs;
 
 #[test]
@@ -158,19 +158,11 @@ fn a_full_disk_is_a_failure_and_a_closed_pipe_is_none() {
     let complaint = failure(sapwise().arg("pairs").arg(&boxes).args(["--out", "/dev/full"]), 1);
     assert!(complaint.contains("/dev/full"), "{complaint}");
     let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-    let ended = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"))
-        .arg("devices")
-        .stdout(full)
-        .output()
-        .unwrap();
+    let ended = program().arg("devices").stdout(full).output().unwrap();
     assert_eq!(ended.status.code(), Some(1));
     let (reader, writer) = std::io::pipe().unwrap();
     drop(reader);
-    let ended = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"))
-        .arg("devices")
-        .stdout(writer)
-        .output()
-        .unwrap();
+    let ended = program().arg("devices").stdout(writer).output().unwrap();
     assert_eq!((ended.status.code(), ended.stderr.len()), (Some(0), 0));
 }
 
@@ -191,7 +183,7 @@ fn schema_writes_a_file_for_every_kind() {
 fn help_that_nobody_gets_is_a_failure() {
     for words in [&["--help"][..], &["probe", "--help"], &["--version"]] {
         let full = fs::File::options().write(true).open("/dev/full").unwrap();
-        let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
+        let mut command = program();
         let ended = command.args(words).stdout(full).output().unwrap();
         let complaint = String::from_utf8(ended.stderr).unwrap();
         assert_eq!(ended.status.code(), Some(1), "{words:?}: {complaint}");
@@ -230,7 +222,7 @@ fn a_second_signal_ends_it_as_if_it_were_not_caught() {
     let boxes = npy(folder.path(), "apart.npy", "<f4", "300000, 6", &apart);
     let mut wait = std::time::Duration::from_millis(300);
     loop {
-        let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
+        let mut command = program();
         let command = command.arg("pairs").arg(&boxes).args(["--algorithm", "brute@cpu1"]);
         let mut pairs = command.stderr(std::process::Stdio::piped()).spawn().unwrap();
         std::thread::sleep(wait);

@@ -7,7 +7,7 @@
 
 mod common;
 
-use common::{sapwise, small_report, success};
+use common::{program, sapwise, small_report, success};
 use sapwise_scenes::{Frames, Random};
 use std::fs;
 #[cfg(unix)]
@@ -75,8 +75,8 @@ fn kill_and_look(words: &[&str], out: &Path, seed: u64) {
     for k in 0..kills {
         // Every other one near the end, where files are written.
         let share = if k % 2 == 0 { random.uniform() } else { 0.8 + 0.25 * random.uniform() };
-        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
-        command.env_remove("SAPWISE_SIMD").args(words).current_dir(out).stdout(Stdio::null()).stderr(Stdio::null());
+        let mut command = program();
+        command.args(words).current_dir(out).stdout(Stdio::null()).stderr(Stdio::null());
         let mut running = command.spawn().unwrap();
         std::thread::sleep(whole.mul_f64(share));
         // It may have ended already.
@@ -110,7 +110,7 @@ fn end_files_early(words: &[&str], out: &Path, before: &[PathBuf]) {
         while filler.as_file().write_all_at(&[1; 4096], filler.as_file().metadata().unwrap().len()).is_ok() {}
         let full = filler.as_file().metadata().unwrap().len();
         filler.as_file().set_len(full.saturating_sub((largest * share) as u64)).unwrap();
-        run_out_of_room(Command::new(assert_cmd::cargo::cargo_bin!("sapwise")).args(words).current_dir(disk.path()));
+        run_out_of_room(program().args(words).current_dir(disk.path()));
         look(words, disk.path(), &before);
     }
     success(sapwise().args(words).current_dir(disk.path()));

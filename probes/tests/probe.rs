@@ -3,7 +3,7 @@
 mod common;
 
 #[cfg(all(unix, feature = "long-tests"))]
-use common::{TERMINATED, send};
+use common::{TERMINATED, program, send};
 use common::{failure, sapwise, success};
 use sapwise_lab::report::Report;
 use sapwise_tune::ParameterId;
@@ -81,8 +81,8 @@ fn a_full_disk_keeps_the_report_in_the_folder_for_temporary_files() {
 /// A probe of all scenarios that has written what it has for the first time, and goes on.
 #[cfg(all(unix, feature = "long-tests"))]
 fn under_way(out: &Path) -> std::process::Child {
-    let mut probe = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
-    probe.env_remove("SAPWISE_SIMD").args(["probe", "--max-objects", "30"]).arg("--out").arg(out);
+    let mut probe = program();
+    probe.args(["probe", "--max-objects", "30"]).arg("--out").arg(out);
     for scenario in sapwise_scenes::Scenario::ALL {
         probe.args(["--scenario", scenario.name()]);
     }

@@ -46,12 +46,12 @@ fn a_file_that_is_no_report_is_never_replaced() {
 #[cfg(all(unix, feature = "long-tests"))]
 #[test]
 fn after_an_interrupt_the_same_command_continues() {
-    use common::{TERMINATED, send};
+    use common::{TERMINATED, program, send};
     use std::fs;
     let folder = tempfile::tempdir().unwrap();
     let until = |profile: &str| {
-        let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
-        command.env_remove("SAPWISE_SIMD").args(TINY).arg("--out").arg(folder.path());
+        let mut command = program();
+        command.args(TINY).arg("--out").arg(folder.path());
         let mut family = command.stderr(std::process::Stdio::piped()).spawn().unwrap();
         let complete = || fs::read_to_string(folder.path().join(profile)).is_ok_and(|t| !t.contains("interrupted "));
         while !complete() {

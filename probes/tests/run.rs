@@ -3,7 +3,7 @@
 mod common;
 
 #[cfg(unix)]
-use common::{TERMINATED, send};
+use common::{TERMINATED, program, send};
 use common::{answer, failure, npy, sapwise, success, tuning};
 use serde_json::{Value, json};
 use std::fs;
@@ -192,7 +192,7 @@ fn an_interrupt_keeps_the_repeats_that_are_complete() {
     let trace = folder.path().join("trace.csv");
     // More repeats than it lives for; the first is over in a hundredth of a second.
     let words = ["--objects", "30", "--frames", "40", "--repeats", "1000", "--seed", "3", "--json"];
-    let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
+    let mut command = program();
     command.args(["run", "uniform", "--tuning"]).arg(&tuning).args(words).arg("--trace").arg(&trace);
     let mut child = command.stdout(std::process::Stdio::piped()).spawn().unwrap();
     // A child that has no handler yet ends at once, without an answer: then it is tried again, later.
@@ -226,7 +226,7 @@ fn a_recording_that_was_made_before_the_interrupt_is_told() {
     let recording = folder.path().join("r.npy");
     // The first repeat takes longer than it lives for.
     let words = ["--objects", "8000", "--frames", "300"];
-    let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
+    let mut command = program();
     command.args(["run", "uniform", "--tuning"]).arg(&tuning).args(words).arg("--record").arg(&recording);
     let mut child = command.stderr(std::process::Stdio::piped()).spawn().unwrap();
     while !recording.exists() {

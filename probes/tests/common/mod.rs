@@ -8,7 +8,12 @@ use std::path::{Path, PathBuf};
 
 /// The command, with no SIMD level from the environment of the tests.
 pub(crate) fn sapwise() -> Command {
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
+    Command::from_std(program())
+}
+
+/// The same, to be spawned.
+pub(crate) fn program() -> std::process::Command {
+    let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
     command.env_remove("SAPWISE_SIMD").env_remove("CARGO");
     command
 }
