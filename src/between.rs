@@ -27,7 +27,7 @@ const COLUMNS: usize = 512;
 /// let tools = [Aabb::cube([0.0; 3], 1.0)];
 /// let parts = [9.0, 1.5].map(|x| Aabb::cube([x, 0.0, 0.0], 1.0));
 ///
-/// let mut between = Between::new(&Registry::new())?;
+/// let mut between = Between::new(&Registry::new());
 /// let mut pairs = Pairs::new();
 /// between.find_pairs(&tools, &parts, &mut pairs)?;
 /// // Positions run through the first list, then continue through the second.
@@ -47,18 +47,16 @@ pub struct Between {
 impl Between {
     /// Makes a search on as many threads as algorithms of this registry may have. One with
     /// [`Registry::with_cores(1)`](Registry::with_cores) runs on the calling thread alone.
-    ///
-    /// # Errors
-    /// [`Error::Unavailable`] if the system refuses the threads.
-    pub fn new(registry: &Registry) -> Result<Self, Error> {
+    #[must_use]
+    pub fn new(registry: &Registry) -> Self {
         let simd = Simd::at_most(registry.simd());
-        Ok(Self {
-            workers: registry.most_workers("between")?,
+        Self {
+            workers: registry.most_workers("between"),
             simd,
             columns: Vec::new(),
             tree: Tree::new(simd),
             outputs: Outputs::default(),
-        })
+        }
     }
 
     /// Replaces the content of `pairs` with the overlapping pairs of a box of `a` and a box of `b`.
@@ -78,7 +76,7 @@ impl Between {
         let work = if compares { few.len() * many.len() / COMPARED } else { a.len() + b.len() };
         let Self { workers, simd, columns, tree, outputs } = self;
         let workers = &workers.fit(work);
-        let _frame = workers.frame();
+        let _frame = workers.frame()?;
         let of_b = |error| match error {
             Error::InvalidBox { index, defect } => Error::InvalidBox { index: a.len() + index, defect },
             other => other,

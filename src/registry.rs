@@ -173,8 +173,8 @@ impl Registry {
         self.simd = self.simd.min(level);
     }
 
-    /// Pins each helper thread of pools made from now on to its own CPU: one to each physical core before any has two.
-    /// Each process and each pool begins at another core.
+    /// Pins each helper thread of algorithms created from now on to its own CPU: one to each physical core before any
+    /// has two. Each process and each pool begins at another core.
     ///
     /// The calling thread is not pinned, because threads that it starts would inherit that. On Linux a helper moves to
     /// a free CPU when it finds the caller on its own core. Under the CPU quota of a cgroup no thread is pinned: the
@@ -241,7 +241,7 @@ impl Registry {
     }
 
     /// Returns the threads that algorithms created from now on may use, as many as they can have.
-    pub(crate) fn most_workers(&self, method: &'static str) -> Result<Workers, Error> {
+    pub(crate) fn most_workers(&self, method: &'static str) -> Workers {
         let most = (1..=self.cores).rev().find(|&k| self.unavailable(k).is_none());
         Workers::new(method, most.unwrap_or(1), &self.threads)
     }

@@ -21,7 +21,7 @@ const BOXES_PER_BOX: usize = 4;
 /// let boxes = [near, near, far, far, near, near];
 /// let starts = [0, 3, 3, 6]; // three worlds: boxes 0 to 2, none, and 3 to 5
 ///
-/// let mut worlds = Worlds::new(&Registry::new())?;
+/// let mut worlds = Worlds::new(&Registry::new());
 /// let mut pairs = Pairs::new();
 /// worlds.find_pairs(&boxes, &starts, &mut pairs)?;
 /// assert_eq!(pairs.as_slice(), [(0, 1), (4, 5)]);
@@ -45,17 +45,15 @@ pub struct Worlds {
 impl Worlds {
     /// Makes a search on as many threads as algorithms of this registry may have. One with
     /// [`Registry::with_cores(1)`](Registry::with_cores) runs on the calling thread alone.
-    ///
-    /// # Errors
-    /// [`Error::Unavailable`] if the system refuses the threads.
-    pub fn new(registry: &Registry) -> Result<Self, Error> {
-        Ok(Self {
-            workers: registry.most_workers("worlds")?,
+    #[must_use]
+    pub fn new(registry: &Registry) -> Self {
+        Self {
+            workers: registry.most_workers("worlds"),
             simd: Simd::at_most(registry.simd()),
             searches: Vec::new(),
             outputs: Outputs::default(),
             offsets: Vec::new(),
-        })
+        }
     }
 
     /// Replaces the content of `pairs` with the overlapping pairs of each world, world after world.
@@ -72,7 +70,7 @@ impl Worlds {
         check_count(boxes.len())?;
         check_starts(starts, boxes.len())?;
         let workers = &workers.fit(boxes.len() / BOXES_PER_BOX);
-        let _frame = workers.frame();
+        let _frame = workers.frame()?;
         workers.check(boxes)?;
         reserve(offsets, starts.len(), "offsets of worlds")?;
         offsets.resize(starts.len(), 0);

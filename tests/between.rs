@@ -6,7 +6,7 @@ use common::{Random, at_every_level, naive_filtered};
 use sapwise::{Aabb, Between, Error, Filter, Membership, PairOrder, Pairs};
 
 fn every_search() -> Vec<(String, Between)> {
-    at_every_level(|registry| Between::new(registry).unwrap())
+    at_every_level(Between::new)
 }
 
 #[test]

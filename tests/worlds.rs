@@ -7,7 +7,7 @@ use sapwise::internals::Pair;
 use sapwise::{Aabb, Error, Filter, Membership, PairOrder, Pairs, Worlds};
 
 fn every_search() -> Vec<(String, Worlds)> {
-    at_every_level(|registry| Worlds::new(registry).unwrap())
+    at_every_level(Worlds::new)
 }
 
 /// Returns the boxes of worlds of `counts` boxes, and the starts. Some boxes are large, infinite or appear twice.

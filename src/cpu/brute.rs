@@ -30,7 +30,7 @@ struct Brute {
 }
 
 pub(super) fn create(threads: u32, pools: &Threads, simd: Simd) -> Result<Box<dyn BroadPhase>, Error> {
-    let workers = Workers::new("brute", threads, pools)?;
+    let workers = Workers::new("brute", threads, pools);
     let (columns, outputs) = (Columns::default(), Outputs::default());
     Ok(Box::new(Brute { workers, order: Vec::new(), columns, outputs, simd }))
 }
@@ -42,7 +42,7 @@ impl BroadPhase for Brute {
         self.columns.resize(boxes.len())?;
         let Self { workers, order, columns, outputs, simd } = self;
         let workers = &workers.fit(boxes.len().saturating_mul(boxes.len()) / (2 * PAIRS_PER_BOX));
-        let _frame = workers.frame();
+        let _frame = workers.frame()?;
         workers.check(boxes)?;
         let active = active_first(order, pairs.screen(), boxes.len())?;
         workers.fill(columns, |first, mut part| {

@@ -24,7 +24,7 @@ struct Bvh {
 }
 
 pub(super) fn create(threads: u32, pools: &Threads, simd: Simd) -> Result<Box<dyn BroadPhase>, Error> {
-    let workers = Workers::new("bvh", threads, pools)?;
+    let workers = Workers::new("bvh", threads, pools);
     Ok(Box::new(Bvh {
         workers,
         tree: Tree::new(simd),
@@ -43,7 +43,7 @@ impl BroadPhase for Bvh {
         check_count(boxes.len())?;
         let Self { workers, tree, upkeep, outputs } = self;
         let workers = &workers.fit(boxes.len());
-        let _frame = workers.frame();
+        let _frame = workers.frame()?;
         upkeep.find(tree, workers, (plan, boxes), outputs, pairs)?;
         pairs.finish_on(workers)
     }

@@ -90,7 +90,7 @@ struct Task {
 }
 
 pub(super) fn create(threads: u32, pools: &Threads, simd: Simd) -> Result<Box<dyn BroadPhase>, Error> {
-    let workers = Workers::new("grid-sap", threads, pools)?;
+    let workers = Workers::new("grid-sap", threads, pools);
     Ok(Box::new(GridSap {
         bins: (0..workers.threads()).map(|_| Bins::default()).collect(),
         apart: Vec::new(),
@@ -113,7 +113,7 @@ impl BroadPhase for GridSap {
         let Self { workers, bins, apart, tree, tasks, outputs, simd } = self;
         let (grid, screen) = (plan.grid(boxes), pairs.screen());
         let workers = &workers.fit(boxes.len());
-        let _frame = workers.frame();
+        let _frame = workers.frame()?;
         let threads = workers.threads();
         let (bins, tasks) = (&mut bins[..threads], &mut tasks[..workers.tasks()]);
         workers.try_each_of(bins.iter_mut().enumerate(), |(k, bin)| {

@@ -3,22 +3,33 @@
 use crate::cpu::phases::Phases;
 use crate::cpu::placement::CpuPlacement;
 use crate::error::Unavailable;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Rounds of spinning in which a helper waits for the next phase of a frame: about 60 µs. With 10 000 boxes the serial
 /// work between two phases of `pair-cache` took 10 to 12 µs.
 const LINGER: u32 = 2000;
 
-/// A pool of helpers: ours, or the program's.
+/// Helpers: own ones, which start when the first frame wants them, or the threads of the program's pool.
 #[derive(Debug)]
 pub(crate) struct Helpers {
+    /// The number of own helpers, and whether each is pinned to its own CPU if that is allowed, and if there is one CPU
+    /// more than helpers.
+    pub(crate) count: u32,
+    pinned: bool,
+    /// Nothing before the start; then the helpers, or why the system refused them.
+    team: OnceLock<Result<Team, Unavailable>>,
+}
+
+/// A pool of helpers that runs.
+#[derive(Debug)]
+struct Team {
     pool: Arc<rayon::ThreadPool>,
     shared: Arc<Shared>,
     /// Whether the caller may itself be a thread of the pool, as with the program's pool.
     may_call: bool,
 }
 
-/// The part of [`Helpers`] that an invited helper holds: it may come after the rest is gone.
+/// The part of a [`Team`] that an invited helper holds: it may come after the rest is gone.
 #[derive(Debug)]
 struct Shared {
     phases: Phases,
@@ -27,42 +38,81 @@ struct Shared {
 }
 
 impl Helpers {
-    /// Makes `count` helpers. Pins each to its own CPU if that is wanted and allowed, and if there is one CPU more than
-    /// helpers.
-    ///
-    /// # Errors
-    /// [`Unavailable::ThreadsRefused`].
-    pub(crate) fn new(count: u32, pinned: bool) -> Result<Self, Unavailable> {
-        let placement = if pinned { CpuPlacement::choose(count as usize + 1).map(Arc::new) } else { None };
-        Ok(Self::over(Arc::new(build_pool(count, placement.clone(), 1)?), placement, false))
+    /// Makes `count` helpers, without starting them.
+    pub(crate) fn new(count: u32, pinned: bool) -> Self {
+        Self { count, pinned, team: OnceLock::new() }
     }
 
     /// Takes the threads of a program's pool, which may run on any core.
     pub(crate) fn of(pool: Arc<rayon::ThreadPool>) -> Self {
-        Self::over(pool, None, true)
+        let count = u32::try_from(pool.current_num_threads()).unwrap_or(u32::MAX);
+        Self { count, pinned: false, team: OnceLock::from(Ok(Team::over(pool, None, true))) }
     }
 
-    fn over(pool: Arc<rayon::ThreadPool>, placement: Option<Arc<CpuPlacement>>, may_call: bool) -> Self {
-        Self { pool, shared: Arc::new(Shared { phases: Phases::default(), placement }), may_call }
+    /// Starts the helpers, unless they run.
+    ///
+    /// # Errors
+    /// [`Unavailable::ThreadsRefused`], now and whenever these helpers are asked for again.
+    pub(crate) fn start(&self) -> Result<(), Unavailable> {
+        self.team().map(drop).map_err(Unavailable::clone)
+    }
+
+    /// Returns whether the system has refused them.
+    pub(crate) fn are_refused(&self) -> bool {
+        matches!(self.team.get(), Some(Err(_)))
+    }
+
+    fn team(&self) -> Result<&Team, &Unavailable> {
+        self.team.get_or_init(|| Team::new(self.count, self.pinned)).as_ref()
     }
 
     /// Begins a frame with up to `count` helpers, who stay between its phases until [`end_frame`](Self::end_frame).
     pub(crate) fn begin_frame(&self, count: usize) {
-        self.follow_caller();
-        self.shared.phases.begin_frame(count.min(self.most()), || self.invite());
+        if let Ok(team) = self.team() {
+            team.follow_caller();
+            team.shared.phases.begin_frame(count.min(team.most()), || team.invite());
+        }
     }
 
     /// Ends a frame.
     pub(crate) fn end_frame(&self) {
-        self.shared.phases.end_frame();
+        if let Ok(team) = self.team() {
+            team.shared.phases.end_frame();
+        }
     }
 
     /// Runs `work` here and on up to `count` helpers that come while it lasts. Returns when nobody works on it any
-    /// more. The caller runs no other job of its pool meanwhile.
+    /// more. The caller runs no other job of its pool meanwhile. Without helpers it does all.
     pub(crate) fn run(&self, count: usize, work: &(dyn Fn() + Sync)) {
-        self.follow_caller();
-        let most = self.most();
-        self.shared.phases.run(count.min(most), most, work, || self.invite());
+        let Ok(team) = self.team() else { return work() };
+        team.follow_caller();
+        let most = team.most();
+        team.shared.phases.run(count.min(most), most, work, || team.invite());
+    }
+
+    /// Returns the invitations that no helper has taken yet, and the helpers that linger.
+    #[cfg(test)]
+    pub(crate) fn coming(&self) -> usize {
+        self.team().unwrap().shared.phases.coming()
+    }
+
+    /// Does as if the system refused them. They must not have been started.
+    #[cfg(test)]
+    pub(crate) fn refuse(&self) {
+        let refused = Unavailable::ThreadsRefused { threads: self.count, message: "a test".to_owned() };
+        self.team.set(Err(refused)).unwrap();
+    }
+}
+
+impl Team {
+    /// Starts own helpers.
+    fn new(count: u32, pinned: bool) -> Result<Self, Unavailable> {
+        let placement = if pinned { CpuPlacement::choose(count as usize + 1).map(Arc::new) } else { None };
+        Ok(Self::over(Arc::new(build_pool(count, placement.clone(), 1)?), placement, false))
+    }
+
+    fn over(pool: Arc<rayon::ThreadPool>, placement: Option<Arc<CpuPlacement>>, may_call: bool) -> Self {
+        Self { pool, shared: Arc::new(Shared { phases: Phases::default(), placement }), may_call }
     }
 
     /// Notes where the caller runs, for helpers that come now and for those whose invitation is not taken yet.
@@ -85,12 +135,6 @@ impl Helpers {
             }
             shared.phases.join(LINGER);
         });
-    }
-
-    /// Returns the invitations that no helper has taken yet, and the helpers that linger.
-    #[cfg(test)]
-    pub(crate) fn coming(&self) -> usize {
-        self.shared.phases.coming()
     }
 }
 
@@ -154,7 +198,7 @@ mod tests {
     #[test]
     fn helpers_are_pinned_if_wanted_allowed_and_possible() {
         for pinned in [false, true] {
-            let helpers = Helpers::new(1, pinned).unwrap();
+            let helpers = Helpers::new(1, pinned);
             let usable = core_affinity::get_core_ids().unwrap().len();
             let cpus = Mutex::new(Vec::new());
             let (all, caller) = (Barrier::new(2), current().id());

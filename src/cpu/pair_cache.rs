@@ -77,8 +77,7 @@ pub(super) fn create(threads: &[u32], pools: &Threads, simd: Simd) -> Result<Box
 
 /// `timed`: it decides by the clock.
 fn pair_cache(threads: &[u32], pools: &Threads, simd: Simd, timed: bool) -> Result<PairCache, Error> {
-    let widths: Vec<Workers> =
-        threads.iter().map(|&k| Workers::new("pair-cache", k, pools)).collect::<Result<_, _>>()?;
+    let widths: Vec<Workers> = threads.iter().map(|&k| Workers::new("pair-cache", k, pools)).collect();
     let widest = &widths[widths.len() - 1];
     let tasks = widest.tasks();
     Ok(PairCache {
@@ -106,7 +105,7 @@ impl BroadPhase for PairCache {
         pairs.clear();
         check_count(boxes.len())?;
         self.fit(boxes.len());
-        let _frame = self.workers.frame();
+        let _frame = self.workers.frame()?;
         let kept = match self.motion.advise(plan, boxes) {
             None => Kept::Incomplete,
             Some(margin) => {

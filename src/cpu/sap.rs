@@ -28,7 +28,7 @@ struct Sap {
 }
 
 pub(super) fn create(threads: u32, pools: &Threads, simd: Simd) -> Result<Box<dyn BroadPhase>, Error> {
-    let workers = Workers::new("sap", threads, pools)?;
+    let workers = Workers::new("sap", threads, pools);
     let (columns, outputs) = (Columns::default(), Outputs::default());
     Ok(Box::new(Sap { workers, keys: Vec::new(), scratch: Vec::new(), columns, outputs, simd }))
 }
@@ -52,7 +52,7 @@ impl BroadPhase for Sap {
         let axis = plan.stats(boxes).sweep_axis();
         let Self { workers, keys, scratch, columns, outputs, simd } = self;
         let workers = &workers.fit(boxes.len());
-        let _frame = workers.frame();
+        let _frame = workers.frame()?;
         workers.check(boxes)?;
         let keys = &mut keys[..boxes.len()];
         workers.map(boxes, keys, |id, b| u64::from(order_key(b.min[axis])) << 32 | id as u64);

@@ -110,7 +110,7 @@ mod tests {
     fn keys_are_sorted_on_any_number_of_threads() {
         let most = if cfg!(feature = "parallel") { 5 } else { 1 };
         for threads in 1..=most {
-            let workers = Workers::new("sort", threads, &Threads::default()).unwrap();
+            let workers = Workers::new("sort", threads, &Threads::default());
             let mut scratch = Vec::new();
             for (len, distinct) in [(0, 1), (1, 1), (4096, 9), (4097, u64::MAX), (50_000, 3), (100_003, u64::MAX)] {
                 let mut keys: Vec<u64> = (0..len as u64 + 7).map(|k| ((mix(k) >> 32) % distinct) << 32 | k).collect();

@@ -10,9 +10,9 @@ use std::{
     sync::{Arc, Mutex, PoisonError},
 };
 
-/// One rayon pool for each number of helpers, made on first use and shared by all algorithms; or the program's own pool
-/// for all.
-#[derive(Debug, Default)]
+/// One rayon pool for each number of helpers, shared by all algorithms and by the clones of this; or the program's own
+/// pool for all.
+#[derive(Debug, Default, Clone)]
 pub struct Threads {
     /// Whether the threads of pools made from now on are pinned; see
     /// [`Registry::pin_threads`](crate::Registry::pin_threads).
@@ -21,11 +21,15 @@ pub struct Threads {
     /// every run.
     pub untimed: bool,
     #[cfg(feature = "parallel")]
-    pools: Mutex<BTreeMap<u32, Arc<Helpers>>>,
+    pools: Arc<Mutex<BTreeMap<Kind, Arc<Helpers>>>>,
     /// The program's pool, with the number of its threads; see [`Registry::use_pool`](crate::Registry::use_pool).
     #[cfg(feature = "parallel")]
     given: Option<(u32, Arc<Helpers>)>,
 }
+
+/// The number of helpers of a pool, and whether they are pinned.
+#[cfg(feature = "parallel")]
+type Kind = (u32, bool);
 
 impl Threads {
     /// Makes pools whose threads are pinned.
@@ -73,21 +77,19 @@ impl Threads {
         too_small.or_else(|| (threads > cores).then_some(Unavailable::TooFewCores { threads, most: cores }))
     }
 
-    /// Returns a pool of `count` helpers; the program's own pool may have more.
-    ///
-    /// # Errors
-    /// [`Unavailable::ThreadsRefused`].
+    /// Returns a pool of `count` helpers, which may not have started; the program's own pool may have more.
     #[cfg(feature = "parallel")]
-    pub(crate) fn helpers(&self, count: u32) -> Result<Arc<Helpers>, Unavailable> {
+    pub(crate) fn helpers(&self, count: u32) -> Arc<Helpers> {
         if let Some((_, given)) = &self.given {
-            return Ok(Arc::clone(given));
+            return Arc::clone(given);
         }
+        let make = || Arc::new(Helpers::new(count, self.pinned));
         let mut pools = self.pools.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(pool) = pools.get(&count) {
-            return Ok(Arc::clone(pool));
+        let pool = pools.entry((count, self.pinned)).or_insert_with(make);
+        // The system may start now what it once refused.
+        if pool.are_refused() {
+            *pool = make();
         }
-        let pool = Arc::new(Helpers::new(count, self.pinned)?);
-        pools.insert(count, Arc::clone(&pool));
-        Ok(pool)
+        Arc::clone(pool)
     }
 }

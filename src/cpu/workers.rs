@@ -15,6 +15,8 @@ use std::sync::{Mutex, PoisonError};
 /// The threads of one algorithm: the calling one, and its helpers from a pool.
 #[derive(Debug)]
 pub struct Workers {
+    #[cfg(feature = "parallel")]
+    method: &'static str,
     threads: usize,
     tasks: usize,
     #[cfg(feature = "parallel")]
@@ -52,26 +54,25 @@ const SMALLEST_TASK: usize = BOXES_PER_THREAD / 2;
 const SMALLEST_FILL: usize = 1024;
 
 impl Workers {
-    /// Makes `threads` threads for the algorithm `method`.
-    pub fn new(method: &'static str, threads: u32, pools: &Threads) -> Result<Self, Error> {
+    /// Takes `threads` threads for the algorithm `method`. The helpers start with the first frame.
+    pub fn new(method: &'static str, threads: u32, pools: &Threads) -> Self {
         #[cfg(not(feature = "parallel"))]
         let _ = (method, pools);
-        Ok(Self {
+        Self {
+            #[cfg(feature = "parallel")]
+            method,
             threads: threads as usize,
             tasks: if threads == 1 { 1 } else { threads as usize * TASKS_PER_THREAD },
             #[cfg(feature = "parallel")]
-            helpers: if threads == 1 {
-                None
-            } else {
-                let unavailable = |reason| Error::Unavailable { algorithm: AlgorithmId::cpu(method, threads), reason };
-                Some(pools.helpers(threads - 1).map_err(unavailable)?)
-            },
-        })
+            helpers: (threads > 1).then(|| pools.helpers(threads - 1)),
+        }
     }
 
     /// Returns the calling thread alone.
     pub fn one() -> Self {
         Self {
+            #[cfg(feature = "parallel")]
+            method: "",
             threads: 1,
             tasks: 1,
             #[cfg(feature = "parallel")]
@@ -94,6 +95,8 @@ impl Workers {
     pub fn fit(&self, boxes: usize) -> Self {
         let threads = self.threads.min(boxes / BOXES_PER_THREAD).max(1);
         Self {
+            #[cfg(feature = "parallel")]
+            method: self.method,
             threads,
             tasks: if threads == 1 { 1 } else { (threads * TASKS_PER_THREAD).min(boxes / SMALLEST_TASK) },
             #[cfg(feature = "parallel")]
@@ -101,16 +104,33 @@ impl Workers {
         }
     }
 
+    /// Starts the helpers, unless they run.
+    ///
+    /// # Errors
+    /// [`Error::Unavailable`] if the system refuses the threads.
+    pub fn start(&self) -> Result<(), Error> {
+        #[cfg(feature = "parallel")]
+        if let Some(helpers) = &self.helpers {
+            let algorithm = || AlgorithmId::cpu(self.method, helpers.count + 1);
+            helpers.start().map_err(|reason| Error::Unavailable { algorithm: algorithm(), reason })?;
+        }
+        Ok(())
+    }
+
     /// Begins a frame: helpers come now, and stay from phase to phase until the returned guard is dropped.
-    pub fn frame(&self) -> Frame {
+    ///
+    /// # Errors
+    /// As [`start`](Self::start).
+    pub fn frame(&self) -> Result<Frame, Error> {
+        self.start()?;
         #[cfg(feature = "parallel")]
         if let Some(helpers) = &self.helpers {
             helpers.begin_frame(self.threads - 1);
         }
-        Frame {
+        Ok(Frame {
             #[cfg(feature = "parallel")]
             helpers: self.helpers.as_ref().map(Arc::clone),
-        }
+        })
     }
 
     /// Runs one phase: hands out the tasks one by one to the caller and its helpers. Returns when all are done.
@@ -196,13 +216,13 @@ mod tests {
         });
         let gates = gates.collect();
         let threads = Threads::of(pool);
-        let helpers = threads.helpers(127).unwrap();
+        let helpers = threads.helpers(127);
         (threads, helpers, gates)
     }
 
     #[test]
     fn threads_and_tasks_follow_the_work() {
-        let wide = Workers::new("test", 128, &Threads::default()).unwrap();
+        let wide = Workers::new("test", 128, &Threads::default());
         for (boxes, threads, tasks) in [
             (0, 1, 1),
             (2047, 1, 1),
@@ -219,7 +239,7 @@ mod tests {
                 (threads, tasks, threads > 1),
                 "{boxes} boxes"
             );
-            let narrow = Workers::new("test", 2, &Threads::default()).unwrap().fit(boxes);
+            let narrow = Workers::new("test", 2, &Threads::default()).fit(boxes);
             assert_eq!((narrow.threads(), narrow.tasks()), (threads.min(2), tasks.min(16)), "{boxes} boxes");
         }
         assert_eq!((wide.threads(), wide.tasks()), (128, 1024));
@@ -228,7 +248,7 @@ mod tests {
     #[test]
     fn helpers_invited_are_at_most_the_tasks() {
         let (threads, helpers, _gates) = busy_helpers();
-        let wide = Workers::new("test", 128, &threads).unwrap();
+        let wide = Workers::new("test", 128, &threads);
         let done = AtomicUsize::new(0);
         let run = |tasks: usize| {
             wide.each_of(0..tasks, |_| _ = done.fetch_add(1, Relaxed));

@@ -281,7 +281,7 @@ mod tests {
     fn assert_sorts<T: Keyed + PartialEq>(list: &[T], what: &str) {
         let threads: &[u32] = if cfg!(feature = "parallel") { &[1, 2, 3, 7] } else { &[1] };
         for &threads in threads {
-            let workers = Workers::new("sort", threads, &Threads::default()).unwrap();
+            let workers = Workers::new("sort", threads, &Threads::default());
             // The second and third time with used buffers.
             let mut sorter = Sorter::default();
             for len in [list.len(), list.len() / 2, list.len()] {

@@ -109,3 +109,32 @@ fn unknown_algorithm_error_lists_the_known_ones() {
     assert!(registry.create(&"brute@gpu0".parse().unwrap()).is_err());
     assert!(registry.create(&"octree@gpu0".parse().unwrap()).is_err());
 }
+
+#[test]
+#[cfg(feature = "parallel")]
+fn refused_threads_are_an_error_of_the_frame() {
+    let registry = Registry::with_cores(3);
+    let boxes: Vec<Aabb> = (0..5000).map(|k| Aabb::cube([k as f32, 0.0, 0.0], 0.5)).collect();
+    let step = |from_objects, id: &str| crate::tuning::Step { from_objects, algorithm: id.parse().unwrap() };
+    let steps = vec![step(0, "pair-cache@cpu1"), step(2000, "pair-cache@cpu3")];
+    let mut adaptive = crate::Adaptive::new(crate::Tuning::from_steps(steps).unwrap(), &registry).unwrap();
+    let ids = cpu::METHODS.iter().map(|method| AlgorithmId::cpu(method.name, 3));
+    let made: Vec<_> = ids.map(|id| (registry.create(&id).unwrap(), id)).collect();
+    let mut pairs = Pairs::new();
+    registry.threads.helpers(2).refuse();
+    for (mut algorithm, id) in made {
+        let Err(Error::Unavailable { algorithm, reason }) = algorithm.find_pairs(&boxes, &mut pairs) else {
+            panic!("{id} ran on refused threads")
+        };
+        assert!(algorithm == id && matches!(reason, Unavailable::ThreadsRefused { threads: 2, .. }), "{reason}");
+    }
+    let mut ran = |adaptive: &mut crate::Adaptive| {
+        adaptive.find_pairs(&boxes, &mut pairs).unwrap();
+        assert_eq!(pairs.len(), 4999);
+        adaptive.last_decision().unwrap().algorithm.to_string()
+    };
+    assert_eq!(ran(&mut adaptive), "pair-cache@cpu1");
+    // The system is asked anew for what is made from now on.
+    adaptive.revive(&registry).unwrap();
+    assert_eq!(ran(&mut adaptive), "pair-cache@cpu3");
+}

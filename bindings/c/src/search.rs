@@ -52,7 +52,7 @@ pub unsafe extern "C-unwind" fn sw_search_new(options: *const sw_options) -> *mu
         // SAFETY: of the caller.
         let options = unsafe { options.as_ref() }.unwrap_or(&sw_options::USUAL);
         let registry = options.registry();
-        let between = Between::new(&registry)?;
+        let between = Between::new(&registry);
         // SAFETY: of the caller.
         let adaptive = unsafe { options.adaptive(registry) }?;
         let search = Search { adaptive, between, pairs: Pairs::new(), copies: Default::default() };

@@ -129,8 +129,8 @@ impl Engine {
         Ok(Self {
             adaptive,
             named: Vec::new(),
-            between: Between::new(&registry)?,
-            worlds: Worlds::new(&registry)?,
+            between: Between::new(&registry),
+            worlds: Worlds::new(&registry),
             pairs: [None, None],
             ran: Ran::Adaptive,
         })

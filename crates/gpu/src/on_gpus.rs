@@ -59,7 +59,7 @@ impl OnGpus {
         let parts = parts.map_err(|e| unavailable(id, e))?;
         // Its own pool without pinning: the threads wait for drivers, whose own threads need a core.
         let threads = usable_cores().min(MOST_COPIERS).max(parts.len() as u32);
-        let workers = Workers::new("gpu", threads, &Threads::default())?;
+        let workers = Workers::new("gpu", threads, &Threads::default());
         let (slabs, any_over) = (Slabs::default(), Arc::default());
         Ok(Box::new(Self { id: id.clone(), parts, slabs, workers, any_over, warm: false }))
     }
@@ -139,6 +139,7 @@ impl BroadPhase for OnGpus {
             let text = format!("{} boxes are more than the {MOST_OBJECTS} that a GPU can number", boxes.len());
             return Err(Failure::limit(text).of(&self.id));
         }
+        self.workers.start()?;
         let found = match self.parts.as_mut_slice() {
             [part] if boxes.len() <= part.engine.most_objects() => {
                 pollster::block_on(part.engine.find(plan, boxes, pairs, &self.workers))

@@ -261,7 +261,7 @@ mod tests {
     }
 
     fn ordered(boxes: &[Aabb], threads: u32, screen: Option<&Screen>) -> (Vec<u32>, usize) {
-        let workers = Workers::new("tree", threads, &Threads::default()).unwrap();
+        let workers = Workers::new("tree", threads, &Threads::default());
         let mut order = Order::default();
         let curve = Curve::over(&SceneStats::of(boxes), boxes.len());
         let moving = order.sort(&workers, boxes, Members::From(0), &curve, screen).unwrap();

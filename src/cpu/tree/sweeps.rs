@@ -186,7 +186,7 @@ mod tests {
     }
 
     fn workers() -> Workers {
-        Workers::new("tree", if cfg!(feature = "parallel") { 3 } else { 1 }, &Threads::default()).unwrap()
+        Workers::new("tree", if cfg!(feature = "parallel") { 3 } else { 1 }, &Threads::default())
     }
 
     /// Boxes walk, jump, come, go, become infinite, and become fixed or cease to be.

@@ -52,7 +52,9 @@ pub(super) fn measure(options: &Options) -> Result<Vec<Parameter>, String> {
 /// A caller and bound helpers, as in a sweep.
 fn workers(threads: usize) -> Result<Workers, String> {
     let threads = u32::try_from(threads).unwrap_or(u32::MAX);
-    Workers::new("fork_join", threads, &Threads::pinned()).map_err(|e| e.to_string())
+    let workers = Workers::new("fork_join", threads, &Threads::pinned());
+    workers.start().map_err(|e| e.to_string())?;
+    Ok(workers)
 }
 
 /// Nanoseconds of one phase with a body of this length for each thread.
