@@ -202,6 +202,16 @@ impl Adaptive {
     }
 }
 
+/// A clone has the same tuning, settings and cache file, and knows what the original has learned. It makes its
+/// algorithms anew from the same registry, so it runs on the same helper threads and GPUs. While the original
+/// [awaits](Origin::Awaited) its tuning, a clone gets the usual one for good. If no algorithm can be made, its frames
+/// are errors.
+impl Clone for Adaptive {
+    fn clone(&self) -> Self {
+        Self { runner: self.runner.twin(), start: self.start.twin() }
+    }
+}
+
 impl BroadPhase for Adaptive {
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
         if self.runner.is_open() {

@@ -26,6 +26,9 @@ type Factory = Arc<dyn Fn(&[u32]) -> Made + Send + Sync>;
 /// assert_eq!(pairs.len(), 1);
 /// # Ok::<(), sapwise::Error>(())
 /// ```
+///
+/// A clone lists the same algorithms, and makes them on the same helper threads and GPUs.
+#[derive(Clone)]
 pub struct Registry {
     entries: Vec<Entry>,
     makers: Vec<Maker>,
@@ -33,7 +36,7 @@ pub struct Registry {
     /// The most threads of a built-in algorithm.
     cores: u32,
     simd: SimdLevel,
-    sources: Vec<Box<dyn AlgorithmSource>>,
+    sources: Vec<Arc<dyn AlgorithmSource>>,
 }
 
 /// Lists algorithms and makes them, for a package that brings many of them, such as those on GPUs.
@@ -46,6 +49,7 @@ pub trait AlgorithmSource: Any + Send + Sync {
 }
 
 /// Makes the algorithm of an entry.
+#[derive(Clone)]
 enum Maker {
     BuiltIn,
     /// The source of this type.
@@ -53,6 +57,7 @@ enum Maker {
     User(UsersMaker),
 }
 
+#[derive(Clone)]
 struct UsersMaker {
     make: Factory,
     /// Whether one instance runs on several numbers of threads.
@@ -159,7 +164,7 @@ impl Registry {
                 self.set(entry, Maker::Source(TypeId::of::<S>()));
             }
         }
-        self.sources.push(Box::new(source));
+        self.sources.push(Arc::new(source));
     }
 
     /// Returns the source of a type that was added.

@@ -100,9 +100,11 @@ pub struct Space {
     ended: Vec<(Handle, Handle)>,
 }
 
-/// A clone goes on as the original would: the same calls give the same lists. It searches with the built-in algorithms
-/// on the CPU, by the same tuning. `clone_from` keeps what searches, as a game that goes back to an earlier state
-/// wants:
+/// A clone goes on as the original would: the same calls give the same lists. It searches with a
+/// [clone](Adaptive#impl-Clone-for-Adaptive) of what searches in the original, on the same helper threads.
+///
+/// `clone_from` takes over bodies, pairs and limit, and leaves alone what searches: it makes no algorithm and forgets
+/// nothing that was learned. A game that goes back to earlier states saves and restores with it:
 ///
 /// ```
 /// use sapwise::{Aabb, Body, Space};
@@ -110,17 +112,17 @@ pub struct Space {
 /// let mut space = Space::new();
 /// let body = space.insert(Aabb::cube([0.0; 3], 1.0), Body::default())?;
 /// space.update()?;
-/// let saved = space.clone();
+/// let mut saved = space.clone();
+/// saved.clone_from(&space); // every frame
 /// space.remove(body)?;
 /// space.update()?;
-/// space.clone_from(&saved);
+/// space.clone_from(&saved); // back
 /// assert!(space.contains(body));
 /// # Ok::<(), sapwise::Error>(())
 /// ```
 impl Clone for Space {
     fn clone(&self) -> Self {
-        let twin = Adaptive::new(self.search.tuning().clone(), &Registry::new());
-        let mut clone = twin.map_or_else(|_| Self::new(), Self::with);
+        let mut clone = Self::with(self.search.clone());
         clone.clone_from(self);
         clone
     }
@@ -147,7 +149,8 @@ impl Default for Space {
 }
 
 impl Space {
-    /// Makes an empty space, with the [usual](Tuning::usual) tuning and one registry of its own.
+    /// Makes an empty space, with the [usual](Tuning::usual) tuning and a registry of its own. It starts no thread: an
+    /// update with many active bodies does.
     #[must_use]
     pub fn new() -> Self {
         let registry = Registry::new();

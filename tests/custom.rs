@@ -7,7 +7,7 @@ mod custom;
 use common::naive;
 use custom::{ID, cost, registry, tuning};
 use sapwise::tuning::Term;
-use sapwise::{Aabb, Adaptive, BroadPhase, Error, PairOrder, Pairs, Reason, Registry};
+use sapwise::{Aabb, Adaptive, Body, BroadPhase, Error, PairOrder, Pairs, Reason, Registry, Space};
 use sapwise_scenes::Scenario;
 use std::time::Duration;
 
@@ -122,4 +122,36 @@ fn frame_after_an_invalid_box_is_right() {
             }
         }
     }
+}
+
+#[test]
+fn clone_has_the_registry_the_tuning_and_what_was_learned() {
+    let registry = with_sleepers();
+    let mut space = Space::with(calls(&registry, &[("quick@cpu1", 50_000.0), ("slow@cpu1", 10_000.0)]));
+    space.search_mut().set_exploring(false);
+    space.insert_all(&resting(40), Body::kinematic()).unwrap();
+    let ran = |space: &mut Space| {
+        space.update().unwrap();
+        space.search().last_decision().unwrap().algorithm.to_string()
+    };
+    let mut young = space.clone();
+    assert_eq!(ran(&mut young), "slow@cpu1");
+    assert!((0..300).any(|_| ran(&mut space) == "quick@cpu1"));
+    let mut twin = space.clone();
+    assert_eq!(twin.search().tuning(), space.search().tuning());
+    assert_eq!(twin.search().learned().costs, space.search().learned().costs);
+    // Its first frame is by the number of objects, as every first one of few boxes.
+    ran(&mut twin);
+    assert_eq!(ran(&mut twin), "quick@cpu1");
+    // Where nothing can be made any more, a frame says so.
+    let mut failing = Registry::with_cores(1);
+    let made = std::sync::atomic::AtomicBool::new(false);
+    failing.add("once@cpu1".parse().unwrap(), 1, move || {
+        let again = made.swap(true, std::sync::atomic::Ordering::Relaxed);
+        let brute = Registry::with_cores(1).create(&"brute@cpu1".parse().unwrap());
+        if again { Err(Error::NoAlgorithm) } else { brute }
+    });
+    let once = Adaptive::only("once@cpu1".parse().unwrap(), &failing).unwrap();
+    let boxes = resting(10);
+    assert!(matches!(once.clone().find_pairs(&boxes, &mut Pairs::new()), Err(Error::Unavailable { .. })));
 }

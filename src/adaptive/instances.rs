@@ -145,6 +145,8 @@ impl Instance {
 
 /// What runs the algorithms of some tuning, and why the last of those that can't run can't.
 pub struct Instances {
+    /// What made them.
+    pub(super) registry: Registry,
     /// In the order of [`Tuning::algorithms`].
     pub(super) candidates: Vec<Candidate>,
     pub(super) instances: Vec<Instance>,
@@ -173,6 +175,7 @@ impl Instances {
     pub fn of(tuning: &Tuning, registry: &Registry) -> Self {
         let ids = tuning.algorithms();
         let mut made = Self {
+            registry: registry.clone(),
             candidates: ids.iter().map(|&id| Candidate { id: id.clone(), instance: None }).collect(),
             instances: Vec::new(),
             failure: None,

@@ -10,6 +10,7 @@ use crate::broad_phase::FrameWork;
 use crate::clock::{self, Instant};
 use crate::error::{Error, Unavailable};
 use crate::pairs::Pairs;
+use crate::registry::Registry;
 use crate::tuning::{Source, Tuning};
 
 /// A runner-up that costs at most this many times what the choice costs reserves its buffers.
@@ -38,6 +39,8 @@ pub(super) struct Runner {
     pub(super) tracker: LoadTracker,
     /// In the order of [`Tuning::algorithms`].
     candidates: Vec<Candidate>,
+    /// What made them.
+    registry: Registry,
     pub(super) policy: Policy,
     choice: Option<Choice>,
     /// An instance gets ready on a thread of its own.
@@ -50,11 +53,23 @@ pub(super) struct Runner {
 
 impl Runner {
     pub(super) fn new(tuning: Tuning, made: Instances) -> Self {
+        Self::with(policy(tuning, &made), made)
+    }
+
+    /// Makes the same algorithms anew. The first frame estimates the load; what was learned stays.
+    pub(super) fn twin(&self) -> Self {
+        let (mut policy, made) = (self.policy.clone(), Instances::of(self.policy.tuning(), &self.registry));
+        policy.remade(&made.kept(), &made.usable());
+        Self::with(policy, made)
+    }
+
+    fn with(policy: Policy, made: Instances) -> Self {
         Self {
             steady: false,
             awaits: false,
             running: None,
-            policy: policy(tuning, &made),
+            policy,
+            registry: made.registry,
             instances: made.instances,
             measured_ns: None,
             work: None,
@@ -97,6 +112,7 @@ impl Runner {
 
     fn exchange(&mut self, made: Instances) {
         (self.candidates, self.instances, self.running) = (made.candidates, made.instances, None);
+        self.registry = made.registry;
         (self.decided, self.choice, self.steady, self.epoch) = (None, None, false, Epoch::default());
     }
 

@@ -78,7 +78,7 @@ impl std::error::Error for SaveError {
 }
 
 /// Writes a tuning to the cache.
-pub(super) type Save = Box<dyn Fn(&Tuning) -> Result<(), SaveError> + Send + Sync>;
+pub(super) type Save = Arc<dyn Fn(&Tuning) -> Result<(), SaveError> + Send + Sync>;
 
 /// What an [`Adaptive`](super::Adaptive) keeps of its start.
 #[derive(Default)]
@@ -102,6 +102,16 @@ pub struct Arrival {
 }
 
 impl Start {
+    /// Returns the start of a clone, for which nothing will arrive.
+    pub(super) fn twin(&self) -> Self {
+        let (mut setup, save) = (self.setup.clone(), self.save.clone());
+        if setup.origin == Origin::Awaited {
+            setup.origin = Origin::Usual;
+            setup.remarks.push("cloned before the measurement ended: the usual tuning stays".to_owned());
+        }
+        Self { setup, save, background: None }
+    }
+
     /// Saves what was learned. `false` when the tuning has not arrived or none could be predicted.
     pub(super) fn save(&self, learned: impl FnOnce() -> Tuning) -> Result<bool, SaveError> {
         match (&self.save, self.setup.origin) {

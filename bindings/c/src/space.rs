@@ -85,8 +85,8 @@ pub unsafe extern "C-unwind" fn sw_space_free(space: *mut sw_space) -> sw_status
     call(|| unsafe { guarded::free(space, |of| &of.space, sw_space::NAME) })
 }
 
-/// Makes a copy that continues as the original would: the same calls give the same lists. It has its own threads, and
-/// learns by itself. NULL on failure: SW_NULL, SW_BUSY or SW_PANIC.
+/// Makes a copy that continues as the original would: the same calls give the same lists. It runs on the same helper
+/// threads, and learns by itself. NULL on failure: SW_NULL, SW_BUSY or SW_PANIC.
 #[unsafe(no_mangle)]
 pub unsafe extern "C-unwind" fn sw_space_clone(space: *const sw_space) -> *mut sw_space {
     // SAFETY: of the caller.

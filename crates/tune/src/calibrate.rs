@@ -98,7 +98,7 @@ fn arrive(options: &StartOptions, registry: &Registry, began: Instant, stop: Arc
         } else {
             arrival.setup.origin = origin;
             arrival.setup.file = file.as_ref().map(|file| file.path().to_owned());
-            arrival.save = file.map(|file| Box::new(move |learned: &Tuning| file.write(learned, measured)) as _);
+            arrival.save = file.map(|file| Arc::new(move |learned: &Tuning| file.write(learned, measured)) as _);
             arrival.tuning = Some((tuning, made));
         }
     }

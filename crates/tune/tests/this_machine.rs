@@ -191,8 +191,12 @@ fn the_background_takes_over_between_frames() {
     // Only a frame checks whether the thread is done.
     assert_eq!((origin(&first), first.tuning().source), (Origin::Awaited, Source::Default));
     assert!(!first.save().unwrap(), "there is nothing to keep yet");
+    let early = first.clone();
+    assert_eq!((origin(&early), early.setup().remarks.len(), early.save().unwrap()), (Origin::Usual, 1, false));
     frames_until_it_came(&mut first);
     assert_eq!((origin(&first), first.tuning().source), (Origin::Probed, Source::Predicted));
+    let late = first.clone();
+    assert_eq!((late.setup(), late.tuning(), late.save().unwrap()), (first.setup(), first.tuning(), true));
     assert!(first.setup().remarks.is_empty() && first.setup().seconds > 0.0, "{:?}", first.setup());
     assert!(first.last_decision().unwrap().predicted_ns.is_some() && first.save().unwrap());
     // So does a decision without a frame.
