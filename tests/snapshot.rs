@@ -29,6 +29,7 @@ fn snapshot_has_this_form() {
     space.update().unwrap();
     space.remove(gone).unwrap();
     space.set(wall, Aabb::new([0.5; 3], [1.0; 3])).unwrap();
+    space.set_limit(Some(9));
     let aabb = json!({ "min": [0.0, 0.0, 0.0], "max": [1.0, 1.0, "inf"] });
     let all = u32::MAX;
     let membership =
@@ -52,6 +53,7 @@ fn snapshot_has_this_form() {
         "pairs": [[0, 1], [0, 2]],
         "begun": [[1, handles[0]], [1, handles[1]]],
         "ended": [],
+        "limit": 9,
     });
     assert_eq!(serde_json::to_value(&space).unwrap(), form);
     let restored: Space = serde_json::from_value(form.clone()).unwrap();

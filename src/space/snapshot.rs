@@ -21,6 +21,8 @@ struct Snapshot {
     pairs: Vec<(u32, u32)>,
     begun: Vec<(Handle, Handle)>,
     ended: Vec<(Handle, Handle)>,
+    /// Of [`Space::set_limit`].
+    limit: Option<usize>,
 }
 
 #[derive(serde::Serialize, serde::Deserialize)]
@@ -85,12 +87,14 @@ impl Snapshot {
             pairs: resting.chain(before.iter().copied().map(slots)).collect(),
             begun: space.begun.clone(),
             ended: space.ended.clone(),
+            limit: active.pairs.limit(),
         }
     }
 
     /// Returns the space, or a description of the defect.
     fn restore(self) -> Result<Space, String> {
         let mut space = Space::new();
+        space.set_limit(self.limit);
         space.reserve(self.slots.len()).map_err(|error| error.to_string())?;
         for slot in &self.slots {
             space.slots.push(slot.generation);
@@ -178,18 +182,26 @@ impl Snapshot {
     }
 }
 
-/// A restored space goes on as the original would: the same calls give the same lists. It searches as
-/// [`Space::new`] does; give it to [`clone_from`](Clone::clone_from) of a space that searches with something else.
+/// Saves the bodies with their handles, the three lists of pairs and the limit. A restored space goes on as the original
+/// would: the same calls give the same lists.
+///
+/// The tuning, the algorithms and their threads are not saved, because they belong to a machine and a program: a
+/// restored space searches as [`Space::new`] does. Restore into a space that searches as you want with
+/// [`clone_from`](Space#impl-Clone-for-Space):
 ///
 /// ```
-/// use sapwise::{Aabb, Body, Space};
+/// use sapwise::{Aabb, Adaptive, Body, Registry, Space, Tuning};
 ///
-/// let mut space = Space::new();
+/// let registry = Registry::with_cores(1);
+/// let mut space = Space::with(Adaptive::new(Tuning::usual(&registry), &registry)?);
 /// let body = space.insert(Aabb::cube([0.0; 3], 1.0), Body::default())?;
 /// space.update()?;
 /// let saved = serde_json::to_string(&space)?;
+/// space.remove(body)?;
+///
 /// let restored: Space = serde_json::from_str(&saved)?;
-/// assert!(restored.contains(body));
+/// space.clone_from(&restored); // `space` still runs on one thread
+/// assert!(space.contains(body));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 impl Serialize for Space {
