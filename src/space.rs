@@ -42,7 +42,8 @@ pub use view::View;
 const IDLE: u64 = 8;
 
 /// Bodies begin to rest when those that could are more than this many times the others. All wake when the resting ones
-/// are fewer than half this many times the others: then one search for all is cheaper.
+/// are fewer than half this many times the others: then one search for all is cheaper, also if they are all fixed, unless
+/// the others move little.
 const MANY: usize = 8;
 
 /// Fewest bodies that rest.

@@ -83,7 +83,7 @@ impl Body {
         self.kinematic
     }
 
-    /// Returns whether the body rests at once, and not only after some frames in which it was not set.
+    /// Returns whether the body may rest in the first update after its insertion.
     pub(super) fn rests_at_once(&self) -> bool {
         self.membership.fixed && !self.kinematic
     }

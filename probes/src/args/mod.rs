@@ -59,15 +59,15 @@ pub(crate) struct Devices {
 
 /// Predicts which algorithm is fastest on this machine for each number of objects, from its hardware parameters.
 ///
-/// Measures the hardware in five seconds, and some more for each GPU, without a sweep. With --report it predicts for
-/// the machine of that report.
+/// Measures the hardware in about five seconds, longer on a busy machine and for each GPU, without a sweep. With
+/// --report it predicts for the machine of that report.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   sapwise predict
   sapwise predict --scenario clustered --out tuning.json
   sapwise predict --report other-machine.json --model mine.json
-  sapwise predict --report this-machine.json --measured --out tuning.json    # measured, for an engine to ship
+  sapwise predict --report this-machine.json --measured --out tuning.json    # measured, for a known machine
   sapwise predict --report reports --measured --out tunings                  # one for each kind of machine")]
 pub(crate) struct Predict {
     /// Predict for the machine of this report, or for each kind of machine in a folder of reports [default: this
