@@ -431,9 +431,7 @@ TOGETHER = {"web": ("web.csv", "web-probes.csv")}
 
 # What a reader of a page asks first.
 NOTES = {
-    "avian": "The engine avian3d with its own broad phase and with a `Space`, step by step in turn. "
-    "Likely: the bodies of `pile` fall asleep in the middle of a run, so its median step is one with or one without "
-    "awake bodies.\n\n",
+    "avian": "Likely: the bodies of `pile` fall asleep midway, so its median step falls on either side.\n\n",
 }
 
 

@@ -21,8 +21,9 @@
 // function may return SW_NULL, SW_BUSY and SW_PANIC. After a failure a count or a single handle is 0, other results are
 // unspecified. A panic never crosses this interface. A C++ exception in a callback ends the process: catch it there.
 //
-// Handles: 0 is none. A handle is never used again. handle >> 32 is a slot, less than the most bodies there were at
-// once, and the next body may get the slot of a removed one: an index for arrays of yours.
+// Handles: 0 is none. A space never uses a handle again. Handles of two spaces may be equal: a call with one of another
+// space may change a body of this one. handle >> 32 is a slot, less than the most bodies there were at once, and the
+// next body may get the slot of a removed one: an index for arrays of yours.
 //
 // Generated from bindings/c/src by `SAPWISE_WRITE_HEADER=1 cargo test --test header`. Don't edit.
 

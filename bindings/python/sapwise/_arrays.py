@@ -1,5 +1,6 @@
 """Converts the arrays of callers for the compiled half."""
 
+import sys
 import warnings
 
 import numpy as np
@@ -25,7 +26,11 @@ _has_warned: set[type] = set()
 def _warn(kind, text):
     if kind not in _has_warned:
         _has_warned.add(kind)
-        warnings.warn(f"{text} Warned once.", kind, stacklevel=3)
+        # The first frame that is not of this package.
+        level, frame = 1, sys._getframe()
+        while frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] == "sapwise":
+            level, frame = level + 1, frame.f_back
+        warnings.warn(f"{text} Warned once.", kind, stacklevel=level)
 
 
 def _warn_of_copy(count, why):
@@ -73,7 +78,7 @@ def _floats(array, name, which):
     if array.dtype.newbyteorder("=") != np.dtype(wanted) or not array.dtype.isnative:
         why = f"their dtype is {array.dtype.str}"
     elif wanted is np.float64:
-        why = "they are 64-bit floats, which are rounded outward to 32 bits"
+        why = "they are 64-bit floats"
     elif not (array.flags.c_contiguous and array.flags.aligned):
         why = "they are not C-contiguous" if array.flags.aligned else "they are not aligned"
     else:

@@ -5,7 +5,7 @@ from typing import Any
 
 
 class SapwiseError(RuntimeError):
-    """A failure that is no fault of the arguments; the base of all exceptions of the package."""
+    """The base of all exceptions of the package; by itself, a failure that is no fault of the arguments."""
 
 
 class InputError(SapwiseError, ValueError):
@@ -45,6 +45,8 @@ class InvalidRayError(_IndexedError):
 
 class StaleHandleError(_IndexedError):
     """A handle that names no body of the space: the body was removed, or is of another space.
+
+    Not every handle of another space raises it: spaces number their bodies alike, so it may name a body of this one.
 
     Attributes
     ----------

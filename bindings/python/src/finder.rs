@@ -60,7 +60,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// >>> with sapwise.BroadPhase(cache=False, measure=False) as broad_phase:
 /// ...     for frame in range(3):
 /// ...         pairs = broad_phase.find(boxes)
-/// ...         print(len(pairs), len(broad_phase.begun), len(broad_phase.ended))
+/// ...         print(len(pairs), len(broad_phase.begun()), len(broad_phase.ended()))
 /// ...         boxes[1, [0, 3]] -= np.float32(0.5)
 /// 0 0 0
 /// 1 1 0
@@ -219,15 +219,13 @@ impl PyBroadPhase {
         Ok(())
     }
 
-    /// ndarray, shape (k, 2): the pairs of the last frame that the previous one did not have, sorted; ids (int64) if
-    /// the frames have ids.
-    #[getter]
+    /// Return the pairs of the last frame that the previous one did not have, sorted: ndarray, shape (k, 2); ids (int64)
+    /// if the frames have ids, else positions (uint32).
     fn begun<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.changed(py, true)
     }
 
-    /// ndarray, shape (k, 2): the pairs of the previous frame that the last one does not have, sorted.
-    #[getter]
+    /// Return the pairs of the previous frame that the last one does not have, as ``begun``.
     fn ended<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.changed(py, false)
     }

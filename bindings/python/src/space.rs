@@ -37,8 +37,8 @@ impl Searcher for Space {
 
 /// Bodies with handles, the pairs of those that overlap, and queries.
 ///
-/// Set the bodies that moved, then ``update``. Bodies that are not set cost nothing. Every call takes effect at the
-/// next ``update``. A call that fails changes nothing. As a context manager it saves what it has learned when the block
+/// Set the bodies that moved, then ``update``. Bodies that are not set cost nothing once they are by far the most. Every
+/// call takes effect at the next ``update``; queries see the last one. A call that fails changes nothing. As a context manager it saves what it has learned when the block
 /// ends.
 ///
 /// Parameters

@@ -31,8 +31,8 @@ def test_frames_with_what_began_and_ended(count):
             now = as_set(found)
             # Asked for in some frames only, once twice: what is told is of the last frame always.
             if frame % 3 != 1:
-                assert as_set(broad_phase.begun) == now - before and as_set(broad_phase.ended) == before - now
-                assert as_set(broad_phase.begun) == now - before and broad_phase.begun.dtype == np.uint32
+                assert as_set(broad_phase.begun()) == now - before and as_set(broad_phase.ended()) == before - now
+                assert as_set(broad_phase.begun()) == now - before and broad_phase.begun().dtype == np.uint32
             before = now
             boxes += np.tile(rng.choice([-0.125, 0, 0.125], (count, 3)), 2).astype(np.float32)
         assert now and broad_phase.last_decision.load["objects"] == count
@@ -43,17 +43,17 @@ def test_ids_follow_boxes_that_change_their_positions():
     rng = np.random.default_rng(5)
     with quiet(ordered=False) as broad_phase:
         broad_phase.find(boxes, ids=ids)
-        assert len(broad_phase.begun) == len(naive(boxes)) and broad_phase.begun.dtype == np.int64
+        assert len(broad_phase.begun()) == len(naive(boxes)) and broad_phase.begun().dtype == np.int64
         for _ in range(5):
             order = rng.permutation(400)
             boxes, ids = boxes[order], ids[order]
             broad_phase.find(boxes, ids=ids)
-            assert broad_phase.begun.shape == broad_phase.ended.shape == (0, 2)
+            assert broad_phase.begun().shape == broad_phase.ended().shape == (0, 2)
         gone = ids[7]
         ended = as_set(np.sort(ids[naive(boxes)], axis=1))
         ended = {p for p in ended if gone in p}
         broad_phase.find(np.delete(boxes, 7, axis=0), ids=np.delete(ids, 7).tolist())
-        assert as_set(broad_phase.ended) == ended and len(ended) > 0 and len(broad_phase.begun) == 0
+        assert as_set(broad_phase.ended()) == ended and len(ended) > 0 and len(broad_phase.begun()) == 0
 
 
 def test_ids_in_one_frame_and_none_in_the_next_are_refused():
@@ -90,10 +90,10 @@ def test_a_frame_that_failed_leaves_no_trace():
         broad_phase.find(boxes)
         with pytest.raises(sapwise.InvalidBoxError):
             broad_phase.find(broken)
-        assert len(broad_phase.begun) == len(broad_phase.ended) == 0
+        assert len(broad_phase.begun()) == len(broad_phase.ended()) == 0
         now = as_set(broad_phase.find(moved))
         before = as_set(naive(boxes))
-        assert as_set(broad_phase.begun) == now - before and as_set(broad_phase.ended) == before - now
+        assert as_set(broad_phase.begun()) == now - before and as_set(broad_phase.ended()) == before - now
 
 
 def test_groups_masks_and_fixed_boxes():
@@ -192,11 +192,11 @@ def test_it_starts_in_the_background_and_ends_soon(tmp_path):
 def test_a_closed_one_says_so():
     broad_phase = quiet()
     assert "no frame yet" in repr(broad_phase) and broad_phase.last_decision is None
-    assert broad_phase.begun.shape == broad_phase.ended.shape == (0, 2)
+    assert broad_phase.begun().shape == broad_phase.ended().shape == (0, 2)
     broad_phase.close()
     broad_phase.close()
     assert broad_phase.closed and "closed" in repr(broad_phase)
-    find, begun = lambda: broad_phase.find(cubes(3)), lambda: broad_phase.begun
+    find, begun = lambda: broad_phase.find(cubes(3)), lambda: broad_phase.begun()
     for use in (find, begun, broad_phase.save, broad_phase.set_filter):
         with pytest.raises(sapwise.SapwiseError, match="closed"):
             use()

@@ -263,8 +263,9 @@ def test_a_crowd_whose_pairs_fill_no_memory():
 
 def test_a_copy_of_many_boxes_is_told_once(warns_again):
     boxes = cubes(10_000).astype(np.float64)
-    with pytest.warns(sapwise.ConversionWarning, match="10000 boxes were copied: they are 64-bit floats"):
+    with pytest.warns(sapwise.ConversionWarning, match="10000 boxes were copied: they are 64-bit floats") as told:
         sapwise.pairs(boxes)
+    assert told[0].filename == __file__
     sapwise.pairs(boxes)
 
 

@@ -25,7 +25,7 @@ def work(k):
     for _ in range(30):
         if not np.array_equal(sapwise.pairs(scenes[k]), known[k]): wrong.append(k)
         if not np.array_equal(shared.find(scenes[k]), known[k]): wrong.append(-k)
-        shared.begun, shared.ended, shared.last_decision, repr(shared)
+        shared.begun(), shared.ended(), shared.last_decision, repr(shared)
 threads = [threading.Thread(target=work, args=(k,)) for k in range(6)]
 [t.start() for t in threads]; [t.join() for t in threads]
 print(wrong)
@@ -114,7 +114,7 @@ for _ in range(3):
             counts = [threads()]
             assert np.array_equal(sapwise.pairs(boxes), known)
             counts.append(threads())
-            assert np.array_equal(broad_phase.find(boxes), known) and len(broad_phase.begun) == len(known)
+            assert np.array_equal(broad_phase.find(boxes), known) and len(broad_phase.begun()) == len(known)
             counts.append(threads())
             # Threads of its own for both.
             if len(os.sched_getaffinity(0)) > 1: assert counts[0] < counts[1] < counts[2], counts

@@ -133,7 +133,7 @@ fn find(
     let age = |kept: &Found| kept.measured.elapsed().unwrap_or_default();
     let Some(limit) = options.measure else {
         if kept.is_none() {
-            remarks.push("no tuning of this machine is kept, and `StartOptions::measure` is off".to_owned());
+            remarks.push("no tuning of this machine is kept, and measuring is off".to_owned());
         }
         return kept;
     };
