@@ -13,17 +13,20 @@
 // Ownership: what sw_..._new returns is yours until sw_..._free. What other functions return is the library's, and
 // valid as long as they say. Arguments stay yours, and no pointer to them is kept after the call.
 //
-// Threads: any thread may use an object. Calls with a const object may run on several threads at once, and inside of
-// callbacks. Others need the object for themselves: while another call uses it they return SW_BUSY and do nothing.
-// After fork, the child makes its own objects and does not free the parent's.
+// Threads: any thread may use an object. A call without const fails with SW_BUSY and does nothing while any other call
+// uses the object; a const call fails while one without const does. So queries may run on several threads at once, and
+// inside of callbacks, but not beside an update. After fork, the child makes its own objects and does not free the
+// parent's.
 //
 // Errors: a function that fails returns another status than SW_OK, or NULL, or 0. sw_last_error has the message. Any
 // function may return SW_NULL, SW_BUSY and SW_PANIC. After a failure a count or a single handle is 0, other results are
 // unspecified. A panic never crosses this interface. A C++ exception in a callback ends the process: catch it there.
 //
-// Handles: 0 is none. A space never uses a handle again. Handles of two spaces may be equal: a call with one of another
-// space may change a body of this one. handle >> 32 is a slot, less than the most bodies there were at once, and the
-// next body may get the slot of a removed one: an index for arrays of yours.
+// Handles: 0 is none. Handles of two spaces may be equal: don't mix them. No body gets the handle of a removed one,
+// except by sw_space_assign and after four billion bodies in its slot.
+//
+// Slots: handle >> 32 is a slot, an index for arrays of yours. The slot of a removed body is used again after the next
+// sw_space_update that succeeds. If removed bodies count until then, slots are less than the most bodies at once.
 //
 // Generated from bindings/c/src by `SAPWISE_WRITE_HEADER=1 cargo test --test header`. Don't edit.
 
@@ -74,17 +77,17 @@ enum sw_status
     SW_INVALID_BOX = 3,
     // A ray, a motion or a point is not finite, or a direction is zero.
     SW_INVALID_RAY = 4,
-    // The handle names no body of this space: it was removed, or is of another space.
+    // The handle names no body of this space, such as that of a removed one. One of another space may name a body.
     SW_STALE_HANDLE = 5,
     // More boxes than 32 bits can number, or than fit into the address space.
     SW_TOO_MANY = 6,
-    // More pairs than the limit of the search.
+    // More pairs than the limit of the search or the space.
     SW_TOO_MANY_PAIRS = 7,
     // The system refused memory.
     SW_OUT_OF_MEMORY = 8,
     // No such algorithm, or it can't run here.
     SW_UNAVAILABLE = 9,
-    // The object is in use: a callback wants to change what calls it, or another thread does.
+    // Another call uses the object: on another thread, or a query whose callback this is.
     SW_BUSY = 10,
     // The object was freed before. Only debug builds of the library know that.
     SW_FREED = 11,
@@ -104,8 +107,10 @@ typedef int32_t sw_status;
 // Finds the pairs of boxes in arrays, one array after the other: those of a frame after those of the previous one.
 typedef struct sw_search sw_search;
 
-// Bodies with handles, and the pairs of those that overlap. Calls take effect at the next sw_space_update; until
-// then the lists of pairs show the last one. A call that fails changes nothing, except sw_space_update.
+// Bodies with handles, and the pairs of those that overlap. The lists of pairs show the last sw_space_update. So do
+// queries: they find bodies where they were then, and none that was inserted or removed since. sw_space_get,
+// sw_space_contains, sw_space_len and sw_space_handles show each call at once. A call that fails changes nothing,
+// except sw_space_update.
 typedef struct sw_space sw_space;
 
 // What a body may meet. Initialise it with SW_BODY_DEFAULT.
@@ -128,8 +133,8 @@ typedef int (*sw_found)(void *user, uint64_t handle);
 // Gets a handle that sw_space_query_boxes found, and the index of the box. Returns 0 for no more.
 typedef int (*sw_found_in)(void *user, size_t index, uint64_t handle);
 
-// Gets a body that a ray or a moved box meets, and the t of it, not in the order of t. Returns the highest t that
-// still matters: t itself to find the first hit, INFINITY to find all, -1 to stop.
+// Gets a body that a ray or a moved box meets, and the t of it, not in the order of t. Returns the new maximum
+// of t, which never rises: t itself to find the first hit, INFINITY to find all, -1 to stop.
 typedef float (*sw_hit)(void *user, uint64_t handle, float t);
 
 // Gets a handle and its distance, nearest first. Returns 0 for no more.
@@ -161,8 +166,8 @@ sw_status sw_box_from_doubles(const double min[3], const double max[3], float bo
 //
 sw_status sw_box_sweep(float bounds[6], const float motion[3]);
 
-// Calls `found` for each body whose box overlaps these bounds. After 0 there are no more calls. SW_INVALID_BOX,
-// SW_OUT_OF_MEMORY.
+// Calls `found` for each body whose box overlaps these bounds. After 0 there are no more calls. A query finds the
+// bodies that the body `by` may meet, and all if it is NULL. SW_INVALID_BOX, SW_INVALID_ARGUMENT, SW_OUT_OF_MEMORY.
 //
 sw_status sw_space_query_box(const sw_space *space,
                              const float bounds[6],
@@ -191,7 +196,8 @@ sw_status sw_space_query_point(const sw_space *space,
                                void *user);
 
 // Calls `hit` for each body whose box meets the ray origin + t * direction, 0 <= t <= max, with the t at which the
-// ray enters the box: 0 if it begins there. max may be INFINITY. SW_INVALID_RAY, SW_OUT_OF_MEMORY.
+// ray enters the box: 0 if it begins there. max may be INFINITY; a ray with a negative one meets nothing.
+// SW_INVALID_RAY, SW_OUT_OF_MEMORY.
 //
 sw_status sw_space_cast_ray(const sw_space *space,
                             const float origin[3],
@@ -202,7 +208,7 @@ sw_status sw_space_cast_ray(const sw_space *space,
                             void *user);
 
 // Writes the body that a ray meets first and the t of it; of several at the same t the one with the lowest handle.
-// Handle 0 if there is none. Otherwise as sw_space_cast_ray.
+// If there is none, handle 0 and the t max. Otherwise as sw_space_cast_ray.
 //
 sw_status sw_space_first_hit(const sw_space *space,
                              const float origin[3],
@@ -301,13 +307,17 @@ sw_space *sw_space_new_with(const sw_options *options);
 // nothing is freed, if a query of it runs: don't free it in a callback.
 sw_status sw_space_free(sw_space *space);
 
-// Makes a copy that continues as the original would: the same calls give the same lists. It runs on the same helper
-// threads, and learns by itself. NULL on failure: SW_NULL, SW_BUSY or SW_PANIC.
+// Makes a copy that continues as the original would: the same calls give the same lists. It has its own threads, and
+// learns by itself. NULL on failure: SW_NULL, SW_BUSY or SW_PANIC.
 sw_space *sw_space_clone(const sw_space *space);
 
 // Makes a space what another one is, as a game does that goes back to an earlier state. It keeps its threads and
-// what it has learned. SW_NULL, SW_BUSY, also if both are the same space.
+// what it has learned. Handles of bodies inserted meanwhile become stale, and the same calls give them out again.
 sw_status sw_space_assign(sw_space *space, const sw_space *from);
+
+// Sets the most pairs that an update may find, from the next one on. 0, the default: no limit. An update that would
+// find more is SW_TOO_MANY_PAIRS. Pairs with bodies that were not set for some updates do not count.
+sw_status sw_space_set_limit(sw_space *space, size_t limit);
 
 // Makes room for more bodies, so that inserting them allocates little. SW_TOO_MANY, SW_OUT_OF_MEMORY.
 sw_status sw_space_reserve(sw_space *space, size_t more);
@@ -349,8 +359,9 @@ sw_status sw_space_remove(sw_space *space, uint64_t handle);
 // Removes n bodies. A handle may be given twice. SW_STALE_HANDLE for the first stale one; then none is removed.
 sw_status sw_space_remove_many(sw_space *space, const uint64_t *handles, size_t n);
 
-// Finds all pairs, and which began and ended since the previous update. SW_OUT_OF_MEMORY, SW_UNAVAILABLE: then no
-// pair has begun or ended, pairs are missing, and the next update compares with the last one that succeeded.
+// Finds all pairs, and which began and ended since the previous update. SW_TOO_MANY_PAIRS, SW_OUT_OF_MEMORY,
+// SW_UNAVAILABLE: then no pair has begun or ended, pairs are missing, and the next update compares with the last one
+// that succeeded.
 sw_status sw_space_update(sw_space *space);
 
 // Returns the pairs of bodies that overlap and may meet, and writes their number: 2 * count handles, of each pair
@@ -362,14 +373,14 @@ const uint64_t *sw_space_pairs(const sw_space *space, size_t *count);
 // Returns the pairs that the previous update did not have, ascending. Otherwise as sw_space_pairs.
 const uint64_t *sw_space_begun(const sw_space *space, size_t *count);
 
-// Returns the pairs that only the previous update had, those of removed bodies included. Otherwise as
-// sw_space_begun.
+// Returns the pairs that only the previous update had. Otherwise as sw_space_begun. Those of removed bodies are among
+// them: sw_space_get fails for these, but no other body has their slot before the next sw_space_insert.
 const uint64_t *sw_space_ended(const sw_space *space, size_t *count);
 
 // Returns the number of bodies. 0 on failure: SW_NULL, SW_BUSY.
 size_t sw_space_len(const sw_space *space);
 
-// Returns whether there is a body with this handle: 1 or 0. 0 on failure: SW_NULL, SW_BUSY.
+// Returns whether there is a body with this handle: 1 or 0. 0 on failure, also beside an update: SW_NULL, SW_BUSY.
 int32_t sw_space_contains(const sw_space *space, uint64_t handle);
 
 // Writes the box and the body of a handle, as set last. Either may be NULL. SW_STALE_HANDLE.

@@ -156,6 +156,7 @@ public:
     static Space measured(const char *cache_folder = nullptr) { return Space(sw_space_new_measured(cache_folder)); }
     Space clone() const { return Space(sw_space_clone(get())); }
     Done assign(const Space &from) { return done(sw_space_assign(get(), from.get())); }
+    Done set_limit(std::size_t pairs) { return done(sw_space_set_limit(get(), pairs)); }
     Done reserve(std::size_t more) { return done(sw_space_reserve(get(), more)); }
     Result<Handle> insert(const Box &box, const Body &body = {}) {
         Handle handle = 0;

@@ -73,9 +73,9 @@ impl sw_options {
 }
 
 fn parse(name: &str, registry: &Registry) -> Result<AlgorithmId, Failure> {
-    name.parse().map_err(|why| {
+    name.parse().map_err(|_| {
         let known: Vec<String> = registry.available().iter().map(|entry| entry.id.to_string()).collect();
-        let hint = format!("{why}; known here: {}", known.join(", "));
+        let hint = format!("known here: {}", known.join(", "));
         Error::UnknownAlgorithm { text: name.to_owned(), hint }.into()
     })
 }

@@ -17,8 +17,8 @@ pub type sw_found_in = Option<unsafe extern "C-unwind" fn(user: *mut c_void, ind
 /// Gets a handle and its distance, nearest first. Returns 0 for no more.
 pub type sw_near = Option<unsafe extern "C-unwind" fn(user: *mut c_void, handle: u64, distance: f32) -> c_int>;
 
-/// Gets a body that a ray or a moved box meets, and the t of it, not in the order of t. Returns the highest t that
-/// still matters: t itself to find the first hit, INFINITY to find all, -1 to stop.
+/// Gets a body that a ray or a moved box meets, and the t of it, not in the order of t. Returns the new maximum
+/// of t, which never rises: t itself to find the first hit, INFINITY to find all, -1 to stop.
 pub type sw_hit = Option<unsafe extern "C-unwind" fn(user: *mut c_void, handle: u64, t: f32) -> f32>;
 
 /// Runs a query on the bodies that `by` may meet, or on all.
@@ -53,8 +53,8 @@ unsafe fn each(found: sw_found, user: *mut c_void) -> Result<impl FnMut(Handle),
     Ok(move |handle: Handle| goes_on = goes_on && unsafe { found(user, handle.to_bits()) } != 0)
 }
 
-/// Calls `found` for each body whose box overlaps these bounds. After 0 there are no more calls. SW_INVALID_BOX,
-/// SW_OUT_OF_MEMORY.
+/// Calls `found` for each body whose box overlaps these bounds. After 0 there are no more calls. A query finds the
+/// bodies that the body `by` may meet, and all if it is NULL. SW_INVALID_BOX, SW_INVALID_ARGUMENT, SW_OUT_OF_MEMORY.
 ///
 /// cbindgen:ptrs-as-arrays=[[bounds; 6]]
 #[unsafe(no_mangle)]
@@ -122,7 +122,8 @@ pub unsafe extern "C-unwind" fn sw_space_query_point(
 }
 
 /// Calls `hit` for each body whose box meets the ray origin + t * direction, 0 <= t <= max, with the t at which the
-/// ray enters the box: 0 if it begins there. max may be INFINITY. SW_INVALID_RAY, SW_OUT_OF_MEMORY.
+/// ray enters the box: 0 if it begins there. max may be INFINITY; a ray with a negative one meets nothing.
+/// SW_INVALID_RAY, SW_OUT_OF_MEMORY.
 ///
 /// cbindgen:ptrs-as-arrays=[[origin; 3], [direction; 3]]
 #[unsafe(no_mangle)]
@@ -153,7 +154,7 @@ unsafe fn ray(origin: *const f32, direction: *const f32, max: f32) -> Result<Ray
 }
 
 /// Writes the body that a ray meets first and the t of it; of several at the same t the one with the lowest handle.
-/// Handle 0 if there is none. Otherwise as sw_space_cast_ray.
+/// If there is none, handle 0 and the t max. Otherwise as sw_space_cast_ray.
 ///
 /// cbindgen:ptrs-as-arrays=[[origin; 3], [direction; 3]]
 #[unsafe(no_mangle)]

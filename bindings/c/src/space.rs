@@ -11,8 +11,10 @@ use sapwise::{Aabb, Error, Handle, Space};
 use std::ffi::c_char;
 use std::ptr::{null, null_mut};
 
-/// Bodies with handles, and the pairs of those that overlap. Calls take effect at the next sw_space_update; until
-/// then the lists of pairs show the last one. A call that fails changes nothing, except sw_space_update.
+/// Bodies with handles, and the pairs of those that overlap. The lists of pairs show the last sw_space_update. So do
+/// queries: they find bodies where they were then, and none that was inserted or removed since. sw_space_get,
+/// sw_space_contains, sw_space_len and sw_space_handles show each call at once. A call that fails changes nothing,
+/// except sw_space_update.
 pub struct sw_space {
     space: Guarded<Space>,
 }
@@ -94,18 +96,34 @@ pub unsafe extern "C-unwind" fn sw_space_clone(space: *const sw_space) -> *mut s
 }
 
 /// Makes a space what another one is, as a game does that goes back to an earlier state. It keeps its threads and
-/// what it has learned. SW_NULL, SW_BUSY, also if both are the same space.
+/// what it has learned. Handles of bodies inserted meanwhile become stale, and the same calls give them out again.
 #[unsafe(no_mangle)]
 pub unsafe extern "C-unwind" fn sw_space_assign(space: *mut sw_space, from: *const sw_space) -> sw_status {
+    let is_itself = from == space.cast_const();
     // SAFETY: of the caller.
     unsafe {
         sw_space::change(space, |space| {
+            if is_itself {
+                return Ok(());
+            }
             sw_space::read(from, |from| {
                 space.clone_from(from);
                 Ok(())
             })
         })
     }
+}
+
+/// Sets the most pairs that an update may find, from the next one on. 0, the default: no limit. An update that would
+/// find more is SW_TOO_MANY_PAIRS. Pairs with bodies that were not set for some updates do not count.
+#[unsafe(no_mangle)]
+pub unsafe extern "C-unwind" fn sw_space_set_limit(space: *mut sw_space, limit: usize) -> sw_status {
+    let set = |space: &mut Space| {
+        space.set_limit((limit > 0).then_some(limit));
+        Ok(())
+    };
+    // SAFETY: of the caller.
+    unsafe { sw_space::change(space, set) }
 }
 
 /// Makes room for more bodies, so that inserting them allocates little. SW_TOO_MANY, SW_OUT_OF_MEMORY.
@@ -230,8 +248,9 @@ pub unsafe extern "C-unwind" fn sw_space_remove_many(space: *mut sw_space, handl
     unsafe { sw_space::change(space, |space| Ok(space.remove_all(self::handles(handles, n)?)?)) }
 }
 
-/// Finds all pairs, and which began and ended since the previous update. SW_OUT_OF_MEMORY, SW_UNAVAILABLE: then no
-/// pair has begun or ended, pairs are missing, and the next update compares with the last one that succeeded.
+/// Finds all pairs, and which began and ended since the previous update. SW_TOO_MANY_PAIRS, SW_OUT_OF_MEMORY,
+/// SW_UNAVAILABLE: then no pair has begun or ended, pairs are missing, and the next update compares with the last one
+/// that succeeded.
 #[unsafe(no_mangle)]
 pub unsafe extern "C-unwind" fn sw_space_update(space: *mut sw_space) -> sw_status {
     // SAFETY: of the caller.
@@ -277,8 +296,8 @@ pub unsafe extern "C-unwind" fn sw_space_begun(space: *const sw_space, count: *m
     unsafe { list(space, count, Space::begun) }
 }
 
-/// Returns the pairs that only the previous update had, those of removed bodies included. Otherwise as
-/// sw_space_begun.
+/// Returns the pairs that only the previous update had. Otherwise as sw_space_begun. Those of removed bodies are among
+/// them: sw_space_get fails for these, but no other body has their slot before the next sw_space_insert.
 #[unsafe(no_mangle)]
 pub unsafe extern "C-unwind" fn sw_space_ended(space: *const sw_space, count: *mut usize) -> *const u64 {
     // SAFETY: of the caller.
@@ -292,7 +311,7 @@ pub unsafe extern "C-unwind" fn sw_space_len(space: *const sw_space) -> usize {
     value(0, || unsafe { sw_space::read(space, |space| Ok(space.len())) })
 }
 
-/// Returns whether there is a body with this handle: 1 or 0. 0 on failure: SW_NULL, SW_BUSY.
+/// Returns whether there is a body with this handle: 1 or 0. 0 on failure, also beside an update: SW_NULL, SW_BUSY.
 #[unsafe(no_mangle)]
 pub unsafe extern "C-unwind" fn sw_space_contains(space: *const sw_space, handle: u64) -> i32 {
     let has = |space: &Space| Handle::from_bits(handle).is_some_and(|handle| space.contains(handle));

@@ -21,17 +21,17 @@ pub enum sw_status {
     SW_INVALID_BOX = 3,
     /// A ray, a motion or a point is not finite, or a direction is zero.
     SW_INVALID_RAY = 4,
-    /// The handle names no body of this space: it was removed, or is of another space.
+    /// The handle names no body of this space, such as that of a removed one. One of another space may name a body.
     SW_STALE_HANDLE = 5,
     /// More boxes than 32 bits can number, or than fit into the address space.
     SW_TOO_MANY = 6,
-    /// More pairs than the limit of the search.
+    /// More pairs than the limit of the search or the space.
     SW_TOO_MANY_PAIRS = 7,
     /// The system refused memory.
     SW_OUT_OF_MEMORY = 8,
     /// No such algorithm, or it can't run here.
     SW_UNAVAILABLE = 9,
-    /// The object is in use: a callback wants to change what calls it, or another thread does.
+    /// Another call uses the object: on another thread, or a query whose callback this is.
     SW_BUSY = 10,
     /// The object was freed before. Only debug builds of the library know that.
     SW_FREED = 11,
@@ -80,10 +80,10 @@ impl From<Error> for Failure {
                 format!("the box for handle {} {defect}; the body keeps its previous box", handle.to_bits())
             }
             Error::Unavailable { algorithm, reason: Unavailable::TooFewCores { threads, most } } => {
-                format!("{algorithm} needs {threads} threads, but has {most}; raise `threads` of sw_options")
+                format!("{algorithm} needs {threads} threads, but {most} may run; raise `threads` of sw_options")
             }
             Error::TooManyPairs { limit } => {
-                format!("more pairs than the limit of {limit}; raise it with sw_search_set_limit")
+                format!("more pairs than the limit of {limit}; raise it with sw_space_set_limit or sw_search_set_limit")
             }
             other => other.to_string(),
         };

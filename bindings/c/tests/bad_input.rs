@@ -185,8 +185,50 @@ fn callback_can_read_but_not_change() {
     // SAFETY: all pointers point to what they should.
     unsafe {
         assert_eq!(sw_space_query_box(space, CUBE.as_ptr(), null(), Some(calls_back), space.cast()), SW_OK);
-        fails(sw_space_assign(space, space), SW_BUSY, "another thread");
+        assert_eq!(sw_space_assign(space, space), SW_OK);
         assert_eq!([sw_space_len(space), sw_space_update(space) as usize, sw_space_free(space) as usize], [3, 0, 0]);
+    }
+}
+
+#[test]
+fn update_beyond_the_limit_is_a_status() {
+    let (space, _) = space();
+    let mut handle = 0;
+    // SAFETY: all pointers point to what they should.
+    unsafe {
+        assert_eq!([sw_space_set_limit(space, 1), sw_space_update(space)], [SW_OK; 2]);
+        assert_eq!(sw_space_insert(space, CUBE.as_ptr(), null(), &raw mut handle), SW_OK);
+        fails(sw_space_update(space), SW_TOO_MANY_PAIRS, "limit of 1; raise it with sw_space_set_limit");
+        assert_eq!([sw_space_set_limit(space, 0), sw_space_update(space), sw_space_free(space)], [SW_OK; 3]);
+    }
+}
+
+/// What the head of the header says of handles and slots.
+#[test]
+fn slots_are_used_again_after_an_update() {
+    let (space, _) = space();
+    let boxes = [CUBE; 100];
+    let mut handles = [0; 100];
+    let mut highest = 0;
+    // SAFETY: all pointers point to what they should.
+    unsafe {
+        let first = boxes.as_ptr().cast();
+        let saved = sw_space_clone(space);
+        assert_eq!(sw_space_insert_many(space, first, 100, 0, null(), null(), handles.as_mut_ptr()), SW_OK);
+        for _ in 0..3 {
+            assert_eq!(sw_space_remove_many(space, handles.as_ptr(), 100), SW_OK);
+            assert_eq!(sw_space_insert_many(space, first, 100, 0, null(), null(), handles.as_mut_ptr()), SW_OK);
+            highest = handles.iter().fold(highest, |most, handle| most.max(handle >> 32));
+            assert_eq!(sw_space_update(space), SW_OK);
+        }
+        assert_eq!((sw_space_len(space), highest), (103, 202));
+        let mut again = [0; 2];
+        for again in &mut again {
+            assert_eq!(sw_space_assign(space, saved), SW_OK);
+            assert_eq!(sw_space_insert(space, CUBE.as_ptr(), null(), again), SW_OK);
+        }
+        assert_eq!(again[0], again[1]);
+        assert_eq!([sw_space_free(space), sw_space_free(saved)], [SW_OK; 2]);
     }
 }
 
@@ -213,9 +255,9 @@ fn wrong_options_make_nothing() {
     unsafe {
         for (options, status, text) in [
             (sw_options { flags: 16, ..zero }, SW_INVALID_ARGUMENT, "0x10"),
-            (sw_options { algorithm: c"sapp".as_ptr(), ..zero }, SW_UNAVAILABLE, "known here: brute@cpu1"),
+            (sw_options { algorithm: c"sapp".as_ptr(), ..zero }, SW_UNAVAILABLE, "\"sapp\"; known here: brute@cpu1"),
             (sw_options { algorithm: c"\xff".as_ptr(), ..zero }, SW_INVALID_ARGUMENT, "not UTF-8"),
-            (sw_options { algorithm: c"sap@cpu3".as_ptr(), threads: 2, ..zero }, SW_UNAVAILABLE, "sw_options"),
+            (sw_options { algorithm: c"sap@cpu3".as_ptr(), threads: 2, ..zero }, SW_UNAVAILABLE, "but 2 may run"),
             (sw_options { algorithm: c"sap@cpu1".as_ptr(), flags: SW_MEASURE, ..zero }, SW_INVALID_ARGUMENT, "drop"),
         ] {
             assert!(sw_space_new_with(&raw const options).is_null());
