@@ -2,7 +2,7 @@
 # Builds the C library and tests it: with gcc and clang, under AddressSanitizer and valgrind, and beside Bullet.
 #
 #   tools/c.sh             # formatting, clippy, tests of the border, and all of that; needs no cargo-c
-#   tools/c.sh install     # as its users: installs it through cargo-c, then builds with it through CMake and Meson
+#   tools/c.sh install     # as its users: builds it in CMake, installs it by CMake and by cargo-c, and builds with it
 #   tools/c.sh overhead    # instructions of a frame through C over those through Rust, at 100 and 100 000 boxes
 #   tools/c.sh bench       # 10 000 moving boxes beside btDbvtBroadphase, into results/c.csv
 #   tools/c.sh header      # writes bindings/c/include/sapwise.h
@@ -85,11 +85,12 @@ test)
     for pair in gcc:g++ clang:clang++; do
         c=${pair%:*} cpp=${pair#*:}
         compile "$c" dev pairs -std=c99 "${sanitize[@]}" "$examples/pairs.c"
+        compile "$cpp" dev entities -std=c++17 "${sanitize[@]}" "$examples/entities.cpp"
         compile "$cpp" dev api -std=c++17 "${sanitize[@]}" bindings/c/tests/api.cpp
         compile "$cpp" dev api-codes -std=c++17 "${sanitize[@]}" -fno-exceptions -DSAPWISE_NO_EXCEPTIONS \
             bindings/c/tests/api.cpp
         compile "$cpp" dev bullet "${sanitize[@]}" "${bullet[@]}"
-        for program in pairs api api-codes "bullet 100"; do
+        for program in pairs entities api api-codes "bullet 100"; do
             echo "c: $program by $c"
             # shellcheck disable=SC2086 # a program and its argument
             "$folder/"$program
@@ -103,6 +104,23 @@ test)
     ;;
 install)
     need "cmake libssl-dev meson ninja-build pkg-config valgrind" cmake meson ninja pkg-config valgrind
+    rm -rf "$folder/added" "$folder/found"
+    mkdir -p "$folder/added"
+    cat >"$folder/added/CMakeLists.txt" <<END
+cmake_minimum_required(VERSION 3.16)
+project(added LANGUAGES C CXX)
+add_subdirectory("$root/bindings/c" "$folder/library")
+add_subdirectory("$examples" examples)
+END
+    cmake -G Ninja -S "$folder/added" -B "$folder/added/build" >/dev/null
+    ninja -C "$folder/added/build" --quiet
+    cmake --install "$folder/added/build" --prefix "$folder/by-cmake" >/dev/null
+    cmake -G Ninja -S "$examples" -B "$folder/found" -DCMAKE_PREFIX_PATH="$folder/by-cmake" >/dev/null
+    ninja -C "$folder/found" --quiet
+    for program in {added/build/examples,found}/{pairs,pairs-static,entities}; do
+        echo "c: $program"
+        "$folder/$program"
+    done
     prefix=$folder/installed
     installed
     bytes=$(stat -L -c %s "$prefix/lib/libsapwise.so")
@@ -116,7 +134,7 @@ install)
             PKG_CONFIG_PATH=$prefix/lib/pkgconfig meson setup "$folder/meson" "$examples" >/dev/null
         fi
         ninja -C "$folder/$how" --quiet
-        for program in pairs pairs-static bullet; do
+        for program in pairs pairs-static entities bullet; do
             echo "c: $program by $how"
             LD_LIBRARY_PATH=$prefix/lib "$folder/$how/$program"
         done

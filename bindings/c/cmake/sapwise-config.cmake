@@ -10,7 +10,8 @@ find_library(SAPWISE_LIBRARY NAMES sapwise sapwise.dll ${_sapwise_where} PATH_SU
 set(CMAKE_FIND_LIBRARY_SUFFIXES ${_sapwise_suffixes})
 
 include(FindPackageHandleStandardArgs)
-find_package_handle_standard_args(sapwise REQUIRED_VARS SAPWISE_LIBRARY SAPWISE_INCLUDE_DIR)
+find_package_handle_standard_args(sapwise REQUIRED_VARS SAPWISE_LIBRARY SAPWISE_INCLUDE_DIR
+  VERSION_VAR sapwise_VERSION)
 if(sapwise_FOUND AND NOT TARGET sapwise::sapwise)
   add_library(sapwise::sapwise UNKNOWN IMPORTED)
   set_target_properties(sapwise::sapwise PROPERTIES

@@ -1,4 +1,4 @@
-//! The header that is checked in is the one that the sources say.
+//! The header that is checked in is the one that the sources say, and the file for CMake has the version.
 
 use std::path::Path;
 
@@ -15,4 +15,12 @@ fn header_is_up_to_date() {
     let is_current = std::fs::read_to_string(&stored).is_ok_and(|stored| stored == generated);
     assert!(is_current, "sapwise.h is stale; run with SAPWISE_WRITE_HEADER=1");
     assert!(generated.lines().count() <= 500, "{} lines", generated.lines().count());
+}
+
+#[test]
+fn cmake_knows_the_version() {
+    let (version, file) = (env!("CARGO_PKG_VERSION"), include_str!("../cmake/sapwise-config-version.cmake"));
+    let (minor, _) = version.rsplit_once('.').unwrap();
+    assert!(file.contains(&format!("set(PACKAGE_VERSION \"{version}\")")), "write {version}");
+    assert!(file.contains(&format!("VERSION_EQUAL {minor} ")), "write {minor}");
 }
