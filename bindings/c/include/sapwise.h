@@ -328,7 +328,8 @@ sw_status sw_space_reserve(sw_space *space, size_t more);
 sw_status sw_space_insert(sw_space *space, const float bounds[6], const sw_body *body, uint64_t *handle);
 
 // Inserts a body like this one for each of n boxes, and writes n handles. Errors as sw_space_insert, with the index
-// of the first wrong box; then nothing is inserted. Boxes that do not lie as in a float[n][6] are copied once.
+// of the first wrong box; then nothing is inserted. Boxes that do not lie as in a float[n][6] are copied once. For a
+// user_data each: sw_space_insert_bodies.
 sw_status sw_space_insert_many(sw_space *space,
                                const float *boxes,
                                size_t n,
@@ -336,6 +337,15 @@ sw_status sw_space_insert_many(sw_space *space,
                                const float *max,
                                const sw_body *body,
                                uint64_t *handles);
+
+// Inserts n boxes with a body each. Otherwise as sw_space_insert_many.
+sw_status sw_space_insert_bodies(sw_space *space,
+                                 const float *boxes,
+                                 size_t n,
+                                 size_t stride,
+                                 const float *max,
+                                 const sw_body *bodies,
+                                 uint64_t *handles);
 
 // Sets the box of a body. SW_STALE_HANDLE, SW_INVALID_BOX.
 //

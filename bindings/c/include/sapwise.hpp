@@ -14,6 +14,7 @@
 #include <string>
 #include <type_traits>
 #include <utility>
+#include <vector>
 #ifndef SAPWISE_NO_EXCEPTIONS
 #include <exception>
 #include <stdexcept>
@@ -77,10 +78,13 @@ template <class T> struct [[nodiscard]] Result {
     explicit operator bool() const { return status == SW_OK; }
     T &operator*() { return value; }
 };
-using Done = Status;
+struct [[nodiscard]] Done {
+    Status status;
+    operator Status() const { return status; }
+};
 template <class T> Result<T> result(Status status, const T &value) { return {status, value}; }
-inline Done done(Status status) { return status; }
-inline Done unequal() { return SW_INVALID_ARGUMENT; }
+inline Done done(Status status) { return {status}; }
+inline Done unequal() { return {SW_INVALID_ARGUMENT}; }
 #else
 struct Error : std::runtime_error {
     Status status;
@@ -89,7 +93,7 @@ struct Error : std::runtime_error {
 template <class T> using Result = T;
 using Done = void;
 inline void done(Status status) { if (status != SW_OK) throw Error(status); }
-[[noreturn]] inline Done unequal() { throw Error(SW_INVALID_ARGUMENT, "give one handle for each box"); }
+[[noreturn]] inline Done unequal() { throw Error(SW_INVALID_ARGUMENT, "give one handle, and one body or one for all, for each box"); }
 template <class T> T result(Status status, const T &value) { done(status); return value; }
 #endif
 
@@ -166,6 +170,12 @@ public:
         if (b.size != handles.size()) return unequal();
         return done(sw_space_insert_many(get(), b.min, b.size, b.stride, b.max, &body, handles.data()));
     }
+    // A body for each box.
+    Done insert(const Boxes &b, Span<Handle> handles, Span<const Body> bodies) {
+        if (b.size != handles.size() || b.size != bodies.size()) return unequal();
+        return done(
+            sw_space_insert_bodies(get(), b.min, b.size, b.stride, b.max, bodies.data(), handles.data()));
+    }
     Done set(Handle handle, const Box &box) { return done(sw_space_set(get(), handle, box.bounds())); }
     Done set(Span<const Handle> handles, const Boxes &b) {
         if (b.size != handles.size()) return unequal();
@@ -180,10 +190,15 @@ public:
     Result<Span<const Pair>> begun() const { return list(sw_space_begun); }
     Result<Span<const Pair>> ended() const { return list(sw_space_ended); }
     std::size_t size() const { return sw_space_len(get()); }
+    // False also on failure, such as beside an update.
     bool contains(Handle handle) const { return sw_space_contains(get(), handle); }
     Result<std::pair<Box, Body>> find(Handle handle) const {
         std::pair<Box, Body> found;
         return result(sw_space_get(get(), handle, found.first.bounds(), &found.second), found);
+    }
+    Result<std::vector<Handle>> handles() const {
+        std::vector<Handle> all(size());
+        return result(sw_space_handles(get(), all.data(), all.size()), all);
     }
     Done save() const { return done(sw_space_save(get())); }
     std::string describe() const { return detail::text(sw_space_describe, get()); }
@@ -200,7 +215,7 @@ public:
     template <class F> Done query_point(Vector point, F &&found, const Body *by = nullptr) const {
         return detail::query<int, Handle>(found, sw_space_query_point, get(), point.data(), by);
     }
-    // hit(Handle, float t) returns the highest t that still matters; if it returns nothing, all do.
+    // hit(Handle, float t) returns the new maximum of t, which never rises; or nothing, to find all.
     template <class F> Done cast_ray(const Ray &r, F &&hit, const Body *by = nullptr) const {
         const float *from = r.origin.data(), *direction = r.direction.data();
         return detail::query<float, Handle, float>(hit, sw_space_cast_ray, get(), from, direction, r.max, by);

@@ -1,13 +1,13 @@
 //! Bodies with handles.
 
-use crate::arrays::{check, flat, handle, handles, put};
+use crate::arrays::{check, flat, handle, handles, put, slice};
 use crate::body::sw_body;
 use crate::boxes::{Boxes, one};
 use crate::guarded::{self, Guarded};
 use crate::options::{SW_MEASURE, save, sw_options};
 use crate::status::{Failure, call, stale, sw_status, value};
 use crate::text;
-use sapwise::{Aabb, Error, Handle, Space};
+use sapwise::{Aabb, Body, Error, Handle, Space};
 use std::ffi::c_char;
 use std::ptr::{null, null_mut};
 
@@ -162,7 +162,8 @@ pub unsafe extern "C-unwind" fn sw_space_insert(
 }
 
 /// Inserts a body like this one for each of n boxes, and writes n handles. Errors as sw_space_insert, with the index
-/// of the first wrong box; then nothing is inserted. Boxes that do not lie as in a float[n][6] are copied once.
+/// of the first wrong box; then nothing is inserted. Boxes that do not lie as in a float[n][6] are copied once. For a
+/// user_data each: sw_space_insert_bodies.
 #[unsafe(no_mangle)]
 pub unsafe extern "C-unwind" fn sw_space_insert_many(
     space: *mut sw_space,
@@ -180,6 +181,35 @@ pub unsafe extern "C-unwind" fn sw_space_insert_many(
             check(handles, n, "handles")?;
             let new = space.insert_all(boxes.to_slice(&mut Vec::new())?, sw_body::or_default(body)?)?;
             new.iter().enumerate().for_each(|(k, new)| handles.add(k).write(new.to_bits()));
+            Ok(())
+        })
+    }
+}
+
+/// Inserts n boxes with a body each. Otherwise as sw_space_insert_many.
+#[unsafe(no_mangle)]
+pub unsafe extern "C-unwind" fn sw_space_insert_bodies(
+    space: *mut sw_space,
+    boxes: *const f32,
+    n: usize,
+    stride: usize,
+    max: *const f32,
+    bodies: *const sw_body,
+    handles: *mut u64,
+) -> sw_status {
+    // SAFETY: of the caller.
+    unsafe {
+        sw_space::change(space, |space| {
+            let boxes = Boxes::new(boxes, n, stride, max)?;
+            check(handles, n, "handles")?;
+            let bodies = slice(bodies, n, "bodies")?;
+            bodies.iter().try_for_each(|body| body.read().map(drop))?;
+            let new = space.insert_all(boxes.to_slice(&mut Vec::new())?, Body::default())?;
+            for (k, (new, body)) in new.into_iter().zip(bodies).enumerate() {
+                // Both are valid.
+                space.set_body(new, body.read()?)?;
+                handles.add(k).write(new.to_bits());
+            }
             Ok(())
         })
     }

@@ -217,8 +217,7 @@ void frames() {
         sapwise::Space twin = saved.clone();
         DO(twin.update());
         CHECK(as_set(value_of(twin.pairs())) == now && value_of(twin.begun()).size() == 0);
-        std::vector<Handle> handles(known.size());
-        CHECK(sw_space_handles(space.get(), handles.data(), handles.size()) == SW_OK);
+        std::vector<Handle> handles = value_of(space.handles());
         auto is = [](Handle handle, const auto &one) { return handle == one.first; };
         CHECK(std::equal(handles.begin(), handles.end(), known.begin(), is));
         CHECK(sw_space_handles(space.get(), handles.data(), 1) == SW_INVALID_ARGUMENT);
@@ -311,6 +310,16 @@ void callbacks() {
         CHECK(thrown == 42 && calls == 1);
     }
 #endif
+    const std::vector<sapwise::Body> bodies = {SW_MOVING, SW_FIXED, SW_FIXED};
+    std::vector<Handle> three(3);
+    DO(space.insert({boxes.data(), 3}, three, bodies));
+    for (std::size_t k = 0; k < 3; k++) CHECK(value_of(space.find(three[k])).second.kind == bodies[k].kind);
+    FAILS(space.insert({boxes.data(), 2}, three, bodies), SW_INVALID_ARGUMENT);
+    DO(space.remove(three));
+    DO(space.set_limit(30));
+    FAILS(space.update(), SW_TOO_MANY_PAIRS);
+    DO(space.set_limit(0));
+    DO(space.update());
     DO(space.remove(handles));
     DO(space.update());
     CHECK(space.size() == 0 && value_of(space.ended()).size() == 36);

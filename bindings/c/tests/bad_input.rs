@@ -118,6 +118,13 @@ fn invalid_boxes_bodies_and_rays_are_named() {
         fails(set, SW_INVALID_BOX, &format!("handle {}", handles[1]));
         let body = sw_body { kind: 3, ..DEFAULT };
         fails(sw_space_set_body(space, handles[0], &raw const body), SW_INVALID_ARGUMENT, "kind of the body is 3");
+        let (boxes, out): ([[f32; 6]; 2], _) = ([CUBE; 2], out.as_mut_ptr());
+        for (first, bodies, status) in [
+            (boxes.as_ptr(), [DEFAULT, body], SW_INVALID_ARGUMENT),
+            ([CUBE, nan].as_ptr(), [DEFAULT; 2], SW_INVALID_BOX),
+        ] {
+            assert_eq!(sw_space_insert_bodies(space, first.cast(), 2, 0, null(), bodies.as_ptr(), out), status);
+        }
         let (origin, zero) = ([f32::INFINITY; 3], [0.0; 3]);
         let hit = |origin: &[f32; 3], direction: &[f32; 3]| {
             let (mut handle, mut t) = (7, 7.0);
