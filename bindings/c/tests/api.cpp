@@ -312,9 +312,9 @@ void callbacks() {
 #endif
     const std::vector<sapwise::Body> bodies = {SW_MOVING, SW_FIXED, SW_FIXED};
     std::vector<Handle> three(3);
-    DO(space.insert({boxes.data(), 3}, three, bodies));
+    DO(space.insert(std::vector<Box>(3, boxes[0]), three, bodies));
     for (std::size_t k = 0; k < 3; k++) CHECK(value_of(space.find(three[k])).second.kind == bodies[k].kind);
-    FAILS(space.insert({boxes.data(), 2}, three, bodies), SW_INVALID_ARGUMENT);
+    FAILS(space.insert(boxes, three, bodies), SW_INVALID_ARGUMENT);
     DO(space.remove(three));
     DO(space.set_limit(30));
     FAILS(space.update(), SW_TOO_MANY_PAIRS);
