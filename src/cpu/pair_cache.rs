@@ -136,7 +136,8 @@ impl BroadPhase for PairCache {
     }
 
     fn prepare(&mut self, objects: usize) {
-        // The frame that needs the memory reports a refused allocation.
+        // The frame that needs the memory or the threads reports a refusal.
+        let _ = self.widths[self.width].fit(objects).start();
         let _ = self.tree.reserve(objects).and_then(|()| self.grown.reserve(objects));
     }
 
