@@ -33,7 +33,8 @@ pub(crate) fn refuse_overwriting(inputs: &[PathBuf], outputs: &[&PathBuf]) -> Re
     Ok(())
 }
 
-/// Tries whether a file can be written, by a temporary file in its folder. A device or a pipe is not tried.
+/// Tries whether a file can be written, by a temporary file in its folder, which is created if it is missing. A device or
+/// a pipe is not tried.
 ///
 /// # Errors
 /// Names the path and what to do.
@@ -51,9 +52,8 @@ pub(crate) fn check_writable(path: &Path) -> anyhow::Result<()> {
     // A link is followed, as it is when the file is written.
     let place = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let folder = place.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    if !folder.is_dir() {
-        bail!("can't write {}: there is no such folder; make it or name another", path.display());
-    }
+    std::fs::create_dir_all(folder)
+        .with_context(|| format!("can't write {}: its folder can't be made; name another", path.display()))?;
     let tried = tempfile::tempfile_in(folder);
     tried.with_context(|| format!("can't write {}: its folder takes no file; name another", path.display()))?;
     Ok(())

@@ -196,18 +196,28 @@ fn help_that_nobody_gets_is_a_failure() {
 #[test]
 fn a_file_that_cannot_be_written_is_told_first() {
     let folder = tempfile::tempdir().unwrap();
-    let missing = folder.path().join("missing").join("out.json");
     let report = folder.path().join("report.json");
     fs::write(&report, small_report("a").to_string()).unwrap();
+    let below_a_file = report.join("out.json");
     let report = report.to_str().unwrap();
     let commands: [&[&str]; 3] =
         [&["train", report, "--out"], &["predict", "--report", report, "--out"], &["run", "uniform", "--record"]];
     for words in commands {
-        let complaint = failure(sapwise().args(words).arg(&missing), 1);
-        assert!(complaint.contains("out.json") && complaint.contains("no such folder"), "{words:?}: {complaint}");
+        let complaint = failure(sapwise().args(words).arg(&below_a_file), 1);
+        assert!(complaint.contains("out.json") && complaint.contains("can't be made"), "{words:?}: {complaint}");
         let complaint = failure(sapwise().args(words).arg(folder.path()), 1);
         assert!(complaint.contains("is a folder"), "{words:?}: {complaint}");
     }
+}
+
+#[test]
+fn a_missing_folder_of_an_output_is_made() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = folder.path().join("report.json");
+    fs::write(&report, small_report("a").to_string()).unwrap();
+    let out = folder.path().join("a/b/tuning.json");
+    success(sapwise().args(["predict", "--report"]).arg(&report).arg("--out").arg(&out));
+    assert!(out.is_file());
 }
 
 #[cfg(unix)]

@@ -175,9 +175,9 @@ fn what_can_not_be_run_is_refused_with_what_to_do() {
         let complaint = failure(&mut run(&scene, &tuning, words), status);
         assert!(needed.iter().all(|text| complaint.contains(text)), "{scene:?} {words:?}: {complaint}");
     }
-    let nowhere = folder.path().join("missing").join("a.svg");
+    let nowhere = folder.path().join("steps.json").join("a.svg");
     let complaint = failure(run("uniform", &tuning, &[]).arg("--plot").arg(&nowhere), 1);
-    assert!(complaint.contains("a.svg") && complaint.contains("no such folder"), "{complaint}");
+    assert!(complaint.contains("a.svg") && complaint.contains("can't be made"), "{complaint}");
     failure(&mut run("uniform", &tuning, &["--trace", "a.txt"]), 2);
     let complaint = failure(run(&scene, &tuning, &[]).arg("--trace").arg(folder.path().join("steps.json")), 2);
     assert!(complaint.contains("steps.json"), "{complaint}");
