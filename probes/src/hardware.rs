@@ -11,13 +11,17 @@ use sapwise_tune::{Hardware, Parameter};
 /// Measures the parameters of the CPU on at most `threads` cores, in under five seconds, then the GPUs that are
 /// taken.
 ///
-/// After Ctrl-C the parameters that were not measured are missing, with the reason. The hardware takes the parameters
-/// of the GPUs; whatever else is known of them is the second part of the answer.
+/// A value that no machine has comes from other programs: the CPU is measured once more then. After Ctrl-C the
+/// parameters that were not measured are missing, with the reason. The hardware takes the parameters of the GPUs;
+/// whatever else is known of them is the second part of the answer.
 ///
 /// # Errors
 /// When no process can be started, or this machine lacks a GPU that `--gpu` names.
 pub(crate) fn measure_hardware(threads: Option<u32>, choice: &GpuChoice) -> anyhow::Result<(Hardware, gpus::Measured)> {
     let mut hardware = measure_cpu(threads);
+    if hardware.implausible().is_some() && !interrupt::requested() {
+        hardware = measure_cpu(threads);
+    }
     let mut measured = gpus::measure(choice, threads)?;
     hardware.gpus = std::mem::take(&mut measured.gpus);
     hardware.gpu_groups = std::mem::take(&mut measured.groups);
@@ -41,6 +45,20 @@ fn measure_cpu(threads: Option<u32>) -> Hardware {
     measure::assemble(measure::machine(), found)
 }
 
+/// Refuses hardware with a value that no machine has.
+///
+/// # Errors
+/// Says that the machine is busy, and names the first such value.
+pub(crate) fn check_plausible(hardware: &Hardware) -> anyhow::Result<()> {
+    match hardware.implausible() {
+        None => Ok(()),
+        Some(why) => anyhow::bail!(
+            "this machine is too busy to be measured: {}, measured twice; end other programs and try again",
+            why.problem()
+        ),
+    }
+}
+
 /// Refuses more threads than this process may use.
 ///
 /// # Errors
@@ -52,5 +70,23 @@ pub(crate) fn check_threads(threads: Option<u32>) -> Result<(), WrongUsage> {
             Err(WrongUsage(format!("--threads {threads}: this process may use {cores} cores; use at most {cores}")))
         }
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sapwise_tune::Machine;
+    use sapwise_tune::hardware::{ParameterId, Statistic};
+
+    #[test]
+    fn impossible_values_say_that_the_machine_is_busy() {
+        let hardware = |ns| {
+            let parameter = Parameter::from_samples(ParameterId::ForkJoinColdNs, Statistic::Median, vec![ns], "test");
+            Hardware::new(Machine::default(), vec![parameter])
+        };
+        assert!(check_plausible(&hardware(60e3)).is_ok());
+        let told = check_plausible(&hardware(16_304_526.5)).unwrap_err().to_string();
+        assert!(told.contains("busy") && told.contains("fork_join_cold_ns") && !told.contains("unit"), "{told}");
     }
 }

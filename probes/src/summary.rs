@@ -123,7 +123,9 @@ pub(crate) fn prediction(hardware: &Hardware, tuning: &Tuning, terminal: Termina
     let warning = match &tuning.warnings[..] {
         [] => return text,
         many if tuning.extrapolated => {
-            format!("this machine is unlike those of the training ({} by --verbose)", count(many.len(), "warning"))
+            let known = tuning.crossovers.iter().any(|b| b.interval().is_some());
+            let so = if known { "" } else { ", so no interval is known" };
+            format!("this machine is unlike those of the training{so} ({} by --verbose)", count(many.len(), "warning"))
         }
         [only] => only.clone(),
         [first, more @ ..] => format!("{first} ({} more by --verbose)", more.len()),

@@ -44,6 +44,7 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
             let (hardware, measured) = measure_hardware(arguments.threads, &arguments.gpus)?;
             remarks = [hardware_doubts(&hardware), hardware.disturbed()].concat();
             interrupt::check()?;
+            hardware::check_plausible(&hardware)?;
             told = summary::gpus_left_out(&arguments.gpus, &hardware, &measured.left_out, &measured.remarks);
             remarks.extend(measured.remarks);
             let (gpus, slice) = (measured.usable, Slice::of(arguments.scenario.unwrap_or(Scenario::Uniform))?);

@@ -6,6 +6,14 @@ use std::fmt;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct HardwareError(pub(super) String);
 
+impl HardwareError {
+    /// Returns the problem without what to do about it.
+    #[must_use]
+    pub fn problem(&self) -> &str {
+        self.0.split_once("; ").map_or(&self.0, |(problem, _)| problem)
+    }
+}
+
 impl fmt::Display for HardwareError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.0)
