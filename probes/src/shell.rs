@@ -33,6 +33,21 @@ pub(crate) fn again(more: &[&str]) -> String {
     words.collect::<Vec<_>>().join(" ")
 }
 
+/// Returns the command that this process was started with, every file named without its folders, which are of this
+/// machine alone.
+pub(crate) fn own_command() -> String {
+    command(std::env::args().skip(1))
+}
+
+fn command(words: impl Iterator<Item = String>) -> String {
+    let short = |word: String| {
+        let (option, path) = word.split_once('=').filter(|_| word.starts_with("--")).unwrap_or(("", &word));
+        let name = Path::new(path).file_name().map_or_else(|| path.into(), |name| name.to_string_lossy());
+        if option.is_empty() { name.into_owned() } else { format!("{option}={name}") }
+    };
+    std::iter::once("sapwise".to_owned()).chain(words.map(short)).collect::<Vec<_>>().join(" ")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -43,5 +58,12 @@ mod tests {
             [quoted("a-b/c.json"), quoted("a b"), quoted("it's"), quoted("")],
             ["a-b/c.json", "'a b'", "'it'\\''s'", "''"]
         );
+    }
+
+    #[test]
+    fn the_command_below_a_picture_names_no_folder() {
+        let words = ["run", "/a/s.npy", "--tuning", "/b/t.json", "--plot=c/p.svg", "--seed=3", "--no-gpus"];
+        let shown = command(words.into_iter().map(str::to_owned));
+        assert_eq!(shown, "sapwise run s.npy --tuning t.json --plot=p.svg --seed=3 --no-gpus");
     }
 }

@@ -41,7 +41,7 @@ host counts the same. A choice that was not timed nearby is charged ten times th
 
 - **unseen scenario**: the host and the scenario were held out. A user's scene is none of ours: this is the number
   that counts.
-- **seen scenario**: only the host was held out. **least to largest**: of the hosts.
+- **seen scenario**: only the host was held out. **least to largest**: of the hosts, in seen scenarios.
 - **one thread**, **several**: seen scenarios, by the threads of the report.
 - **by means**: judged by the mean over frames instead of the median, which includes rebuilds and interruptions.
 - **crossovers off by**: median distance between measured and predicted crossovers of all scenarios; an octave is a
@@ -58,8 +58,8 @@ const STRATEGIES: &str = "
 from load and parameters. `nearest machine` takes the measured costs of the most similar host. `direct regression`
 is the paper's: crossovers as power laws of parameters, and a choice by the number of objects. `frozen constants`
 switch from brute force at 64 (nexus) or 1000 objects (mujoco_warp). `single best` is always the same algorithm.
-`full sweep` has measured the held-out host itself and is judged by the same timings, in an unseen scenario by the
-others.
+`full sweep` has measured the held-out host itself: in a seen scenario it is judged by the timings that it was fitted
+to, in an unseen one by those of the scenario that it was not fitted to.
 ";
 
 /// Returns the model card as a page of Markdown, with the notes of the training.

@@ -1,20 +1,29 @@
 //! Regrets and crossovers of what was held out, for figures and tables.
 
 use super::crossovers::ComparedCrossover;
-use super::scores::{Judged, OURS, regrets_of_units};
-use std::collections::BTreeSet;
+use super::scores::{Judged, regrets_of_units};
+use crate::training::Regrets;
 
 /// The held-out machines.
 #[derive(Debug, Clone, Default)]
 pub struct HeldOut {
-    /// For each strategy the mean regret on each held-out machine, or on each profile of the only one.
-    pub regrets: Vec<(&'static str, Vec<f64>)>,
-    /// The machine, or the file of the profile, that each regret of [`OURS`] is of.
-    pub units: Vec<String>,
-    /// Whether the regrets are of machines.
-    pub by_machine: bool,
+    /// The mean regrets of each strategy on each held-out machine, or on each profile of the only one.
+    pub regrets: Vec<UnitRegrets>,
     /// Measured crossovers beside the predicted ones.
     pub crossovers: Vec<HeldOutCrossover>,
+}
+
+/// The mean regrets of a strategy on what was held out.
+#[derive(Debug, Clone)]
+pub struct UnitRegrets {
+    /// The strategy.
+    pub strategy: &'static str,
+    /// The machine, or the file of the profile of the only one.
+    pub unit: String,
+    /// With only the machine held out.
+    pub seen: Regrets,
+    /// With the scenario held out too; `None` if the strategy is not judged on that.
+    pub unseen: Option<Regrets>,
 }
 
 /// A crossover of a held-out profile.
@@ -30,13 +39,6 @@ pub struct HeldOutCrossover {
 
 impl HeldOut {
     pub(super) fn new(all: &[Judged], crossovers: Vec<HeldOutCrossover>, by_machine: bool) -> Self {
-        let ours = all.iter().filter(|j| j.name == OURS);
-        let units: BTreeSet<&str> = ours.map(|j| j.unit(by_machine)).collect();
-        Self {
-            regrets: regrets_of_units(all, by_machine),
-            units: units.into_iter().map(str::to_owned).collect(),
-            by_machine,
-            crossovers,
-        }
+        Self { regrets: regrets_of_units(all, by_machine), crossovers }
     }
 }

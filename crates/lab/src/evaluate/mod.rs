@@ -16,7 +16,7 @@ mod validate;
 
 pub use baselines::by_costs;
 pub use crossovers::ComparedCrossover;
-pub use held_out::{HeldOut, HeldOutCrossover};
+pub use held_out::{HeldOut, HeldOutCrossover, UnitRegrets};
 pub use influence::{Influence, Slope, influences};
 pub use partition::Partition;
 pub use regret_table::{NOT_TIMED, Regret, RegretTable, Strategy};

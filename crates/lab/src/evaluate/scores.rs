@@ -1,5 +1,6 @@
 //! From regrets on held-out profiles to the scores of strategies.
 
+use super::held_out::UnitRegrets;
 use super::regret_table::Regret;
 use crate::data::Profile;
 use crate::spread::range;
@@ -58,19 +59,22 @@ pub(super) fn scores(all: &[Judged], by_machine: bool) -> Vec<MethodScore> {
     names(all).into_iter().map(|name| score(all, name, by_machine)).collect()
 }
 
-/// Returns for each strategy, in the order of the first profile, the mean regret on each held-out machine, or on each
+/// Returns the mean regrets of each strategy, in the order of the first profile, on each held-out machine, or on each
 /// profile of the only one.
-pub(super) fn regrets_of_units(all: &[Judged], by_machine: bool) -> Vec<(&'static str, Vec<f64>)> {
-    names(all).into_iter().map(|name| (name, of_units(all, name, by_machine, |r| r.mean))).collect()
+pub(super) fn regrets_of_units(all: &[Judged], by_machine: bool) -> Vec<UnitRegrets> {
+    names(all).into_iter().flat_map(|name| of_units(all, name, by_machine)).collect()
 }
 
-/// Returns the mean regret of a strategy on each held-out machine or profile.
-fn of_units(all: &[Judged], name: &str, by_machine: bool, of: impl Fn(&Regret) -> f64) -> Vec<f64> {
-    let mut units: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
-    all.iter()
-        .filter(|j| j.name == name)
-        .for_each(|j| units.entry(j.unit(by_machine)).or_default().push(of(&j.regret)));
-    units.values().map(|regrets| stats::mean(regrets)).collect()
+/// Returns the mean regrets of a strategy on each held-out machine or profile.
+fn of_units(all: &[Judged], strategy: &'static str, by_machine: bool) -> Vec<UnitRegrets> {
+    let mut units: BTreeMap<&str, Vec<&Judged>> = BTreeMap::new();
+    all.iter().filter(|j| j.name == strategy).for_each(|j| units.entry(j.unit(by_machine)).or_default().push(j));
+    let regrets = |(unit, own): (&str, Vec<&Judged>)| {
+        let unseen = split(&of(&own, |j| j.unseen.as_ref())).map(|s| s.all);
+        let seen = split(&of(&own, |j| Some(&j.regret)))?.all;
+        Some(UnitRegrets { strategy, unit: unit.to_owned(), seen, unseen })
+    };
+    units.into_iter().filter_map(regrets).collect()
 }
 
 /// Returns the names of the strategies, in the order of the first profile.
@@ -84,7 +88,7 @@ fn names(all: &[Judged]) -> Vec<&'static str> {
     names
 }
 
-fn score(all: &[Judged], name: &str, by_machine: bool) -> MethodScore {
+fn score(all: &[Judged], name: &'static str, by_machine: bool) -> MethodScore {
     let own: Vec<&Judged> = all.iter().filter(|j| j.name == name).collect();
     let mut profiles: BTreeMap<&str, f64> = BTreeMap::new();
     own.iter().for_each(|j| *profiles.entry(&j.machine).or_default() += 1.0);
@@ -96,7 +100,8 @@ fn score(all: &[Judged], name: &str, by_machine: bool) -> MethodScore {
     let crossings: Option<Vec<f64>> =
         own.iter().map(|j| j.crossings.as_deref()).collect::<Option<Vec<_>>>().map(|c| c.concat());
     let near = |c: &Vec<f64>| c.iter().filter(|e| **e <= NEAR_OCTAVES).count() as f64 / c.len() as f64;
-    let ends = range(&of_units(all, name, by_machine, |r| r.mean));
+    let of_units: Vec<f64> = of_units(all, name, by_machine).iter().map(|u| u.seen.all).collect();
+    let ends = range(&of_units);
     let seen = split(&of(&own, |j| Some(&j.regret)));
     MethodScore {
         name: name.to_owned(),

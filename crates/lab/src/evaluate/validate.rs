@@ -61,7 +61,7 @@ pub fn validate(
                     .to_owned(),
             );
         }
-        notes.push("the full sweep is judged by the timings that it was fitted to".to_owned());
+        notes.push("in seen scenarios, the full sweep is judged by the timings that it was fitted to".to_owned());
         let (data, seen) = (Material::new(profiles), Seen::new(None, designs));
         let most = MOST_JUDGED.div_ceil(partition.folds.len());
         // Evenly over a fold. Profiles of GPUs alone are left out: a program always has the CPU to choose as well.

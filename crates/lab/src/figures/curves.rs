@@ -1,7 +1,7 @@
 //! Curves over two logarithmic axes, with the fields of optimal performance behind them: Figures 4, 6 and 7 of the
 //! paper.
 
-use super::{Area, HPos, Result, colour, grid, mesh, panels, range, svg, text};
+use super::{Area, HPos, Result, base, colour, grid, mesh, panels, range, svg, text};
 use plotters::prelude::*;
 
 /// Panels with the same axes.
@@ -67,7 +67,7 @@ impl Curves {
             .margin_right(16)
             .x_label_area_size(44)
             .y_label_area_size(70)
-            .build_cartesian_2d(x.clone().log_scale(), y.clone().log_scale())?;
+            .build_cartesian_2d(x.clone().log_scale().base(base(&x)), y.clone().log_scale().base(base(&y)))?;
         let place = |name: &str| colour(names.iter().position(|n| n == name).unwrap_or_default());
         let rectangle = |f: &Field| {
             let corners = [(f.from.clamp(x.start, x.end), y.start), (f.to.clamp(x.start, x.end), y.end)];

@@ -22,7 +22,10 @@ fn curves_have_names_fields_and_axes() {
     };
     let curves = Curves { title: ODD.to_owned(), x_name: "objects", y_name: "time", panels: vec![panel; 5] };
     check(&curves.svg().unwrap(), &["1 thread", "objects", "time", "10 000"]);
-    check(&Curves { panels: vec![CurvePanel::default()], ..curves }.svg().unwrap(), &[]);
+    check(&Curves { panels: vec![CurvePanel::default()], ..curves.clone() }.svg().unwrap(), &[]);
+    let panel = CurvePanel { curves: vec![curve("bvh", &[(1.0, 1.0), (16.0, 3.0)])], ..CurvePanel::default() };
+    let svg = Curves { panels: vec![panel], x_name: "threads", y_name: "speed-up", ..curves }.svg().unwrap();
+    check(&svg, &[1, 2, 4, 8, 16].map(|n| format!("\n{n}\n")).each_ref().map(|n| &n[..]));
 }
 
 #[test]

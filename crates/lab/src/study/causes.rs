@@ -6,6 +6,7 @@ use crate::data::{COMPARED, Profile, is_real};
 use crate::evaluate::{Influence, influences};
 use crate::figures::Ratios;
 use crate::report::Label;
+use crate::text::count;
 use anyhow::Result;
 use sapwise::AlgorithmId;
 use sapwise_tune::GpuHardware;
@@ -23,10 +24,13 @@ pub(super) fn section(material: &Material, page: &mut Page, files: &mut Vec<(&st
     match &hosts[..] {
         [reference, others @ ..] if !others.is_empty() => {
             let svg = cpus(reference, others).svg()?;
-            let caption = "Figures 10 and 11 for CPUs: parameters over those of the reference, and how many times as \
-                fast each method is on \
-                           one thread, geometric mean over shared frames of 1000 objects or more.";
-            page.figure("figure-10-cpus.svg", &svg, caption);
+            let caption = format!(
+                "Figures 10 and 11 for CPUs: parameters over those of the reference, and how many times as fast each \
+                 method is on one thread, geometric mean over shared frames of 1000 objects or more. {} show what goes \
+                 together, not what causes what.",
+                count(hosts.len(), "host")
+            );
+            page.figure("figure-10-cpus.svg", &svg, &caption);
             files.push(("figure-10-cpus.svg", svg));
         }
         _ => page.lacks("Figures 10 and 11 for CPUs: it takes two hosts."),
@@ -70,11 +74,16 @@ fn influence(material: &Material, page: &mut Page, files: &mut Vec<(&str, String
     let rows: Vec<Vec<String>> = found.iter().map(row).collect();
     files.push(("influence.csv", super::csv::table(columns, rows.iter().cloned())?));
     let head = columns.split(' ').map(|c| c.replace('_', " ")).collect();
-    let caption = "Octaves that a crossover moves up when a parameter doubles. Model: halved and doubled, median over \
-                   reports and scenarios. Data: least squares on the logarithm, each scenario with its own constant; \
-                   least and most with one host left out. Decided: whether these hosts can tell the parameter from \
-                   others. Parameters that the model moves it by under 0.1 octaves are left out.";
-    page.table(caption, &[vec![head], rows].concat());
+    let hosts = crate::data::machines(&material.profiles).len();
+    let caption = format!(
+        "Figure 11: octaves that a crossover moves up when a parameter doubles. Model: halved and doubled, median over \
+         reports and scenarios. Data: least squares on the logarithm, each scenario with its own constant; least and \
+         most with one host left out. Decided: whether these hosts can tell the parameter from others. Parameters that \
+         the model moves it by under 0.1 octaves are left out. Reports of one host are no independent machines: a \
+         slope rests on {} at most.",
+        count(hosts, "host")
+    );
+    page.table(&caption, &[vec![head], rows].concat());
     Ok(())
 }
 

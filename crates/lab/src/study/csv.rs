@@ -1,8 +1,11 @@
 //! Tidy tables as CSV: a row for each value, with the report and the host that it is from.
 
 use super::Material;
+use crate::data::is_sound;
+use crate::evaluate::UnitRegrets;
 use anyhow::Result;
 use sapwise::algorithm::{Backend, BackendClass};
+use sapwise_tune::stats::{mean, quantile};
 
 /// Writes a table with these columns.
 pub(super) fn table(columns: &str, mut rows: impl Iterator<Item = Vec<String>>) -> Result<String> {
@@ -12,24 +15,29 @@ pub(super) fn table(columns: &str, mut rows: impl Iterator<Item = Vec<String>>) 
     Ok(String::from_utf8(writer.into_inner()?)?)
 }
 
-/// Every median and mean time of the studied reports.
+/// Every studied timing: number of samples, quartiles and mean.
 pub(super) fn timings(material: &Material) -> Result<String> {
     let columns = "report host scenario algorithm method processor threads gpus objects pairs moved moved_share \
-                   median_ns mean_ns";
+                   samples quartile_1_ns quartile_3_ns median_ns mean_ns";
     let mut rows = Vec::new();
-    for profile in &material.profiles {
-        for spot in &profile.points {
-            for (&(k, median_ns), mean_ns) in spot.medians.iter().zip(&spot.means) {
-                let id = profile.id(k);
-                let on_gpus = id.backend().class() == BackendClass::Gpu;
-                let (threads, gpus) = if on_gpus { (0, id.backend().width()) } else { (id.threads(), 0) };
-                let words = [&profile.file, profile.machine(), &spot.scenario, &id.to_string(), id.method()];
-                let processor = if on_gpus { "gpu" } else { "cpu" };
-                let counts = [threads, gpus, spot.load.objects].map(|n| n.to_string());
-                let numbers = [spot.load.pairs, spot.load.moved, spot.load.moved_share, median_ns, *mean_ns];
-                let words = words.map(str::to_owned).into_iter().chain([processor.to_owned()]);
-                rows.push(words.chain(counts).chain(numbers.map(|n| n.to_string())).collect());
+    for (profile, report) in material.studied() {
+        for (point, timing) in report.points.iter().flat_map(|p| p.timings.iter().map(move |t| (p, t))) {
+            let id = &timing.algorithm;
+            if !is_sound(timing) || profile.position(id).is_none() || point.load.objects == 0 {
+                continue;
             }
+            let ns: Vec<f64> = timing.samples_ns.iter().map(|&ns| ns as f64).collect();
+            let [low, high, middle] = [0.25, 0.75, 0.5].map(|share| quantile(&ns, share));
+            let on_gpus = id.backend().class() == BackendClass::Gpu;
+            let (threads, gpus) = if on_gpus { (0, id.backend().width()) } else { (id.threads(), 0) };
+            let words = [&profile.file, profile.machine(), &point.scenario, &id.to_string(), id.method()];
+            let processor = if on_gpus { "gpu" } else { "cpu" };
+            let counts = [threads, gpus, point.load.objects].map(|n| n.to_string());
+            let of_load = [point.load.pairs, point.load.moved, point.load.moved_share].map(|n| n.to_string());
+            let times = [low, high, middle, Some(mean(&ns))].map(|n| n.map_or(String::new(), |n| n.to_string()));
+            let words = words.map(str::to_owned).into_iter().chain([processor.to_owned()]);
+            let samples = [ns.len().to_string()];
+            rows.push(words.chain(counts).chain(of_load).chain(samples).chain(times).collect());
         }
     }
     table(columns, rows.into_iter())
@@ -65,20 +73,17 @@ pub(super) fn crossovers(material: &Material) -> Result<String> {
     table(columns, rows.into_iter())
 }
 
-/// The mean regret of each strategy on each host, or report of the only host, that was held out.
+/// The mean regrets of each strategy on each host, or report of the only host, that was held out.
 pub(super) fn regrets(material: &Material) -> Result<String> {
-    let mut rows = Vec::new();
-    for held_out in material.trained.iter().map(|t| &t.held_out) {
-        for (strategy, regrets) in &held_out.regrets {
-            // A strategy that was judged on fewer units does not say on which.
-            let named = regrets.len() == held_out.units.len();
-            for (k, regret) in regrets.iter().enumerate() {
-                let unit = if named { held_out.units[k].clone() } else { String::new() };
-                rows.push(vec![(*strategy).to_owned(), unit, regret.to_string()]);
-            }
-        }
-    }
-    table("strategy held_out mean_regret_share", rows.into_iter())
+    let columns = "strategy held_out folder seen_share seen_in_games_share unseen_share unseen_in_games_share";
+    let held_out = material.trained.iter().flat_map(|t| &t.held_out.regrets);
+    let row = |of: &UnitRegrets| {
+        let folder = material.profiles.iter().filter(|p| p.machine() == of.unit).find_map(|p| p.file.split_once('/'));
+        let words = [of.strategy, &of.unit, folder.map_or("", |(folder, _)| folder)].map(str::to_owned);
+        let regrets = [Some(of.seen), of.unseen].into_iter().flat_map(|r| [r.map(|r| r.all), r.map(|r| r.in_games)]);
+        words.into_iter().chain(regrets.map(|r| r.map_or(String::new(), |r| r.to_string()))).collect()
+    };
+    table(columns, held_out.map(row))
 }
 
 /// Every hardware parameter of every report.

@@ -93,10 +93,13 @@ fn map(material: &Material, profile: &Profile) -> Result<(FieldMap, Option<Strin
         Some((f64::from(spot.load.objects), density(&spot.load), place(profile.id(best.0).to_string())))
     };
     let points = timed().filter_map(point).collect();
-    let mut panels = vec![MapPanel { title: "measured".to_owned(), cells: measured, points }];
-    panels.extend(predicted.map(|cells| MapPanel { title: "predicted".to_owned(), cells, points: Vec::new() }));
+    let mut panels =
+        vec![MapPanel { title: "measured; dots: frames of all scenarios".to_owned(), cells: measured, points }];
+    let without = other.as_ref().map_or("", |(_, held_out)| held_out);
+    let told = format!("predicted without this {without}");
+    panels.extend(predicted.map(|cells| MapPanel { title: told, cells, points: Vec::new() }));
     let map = FieldMap {
-        title: format!("Fastest algorithm over objects and density: {}", title(profile)),
+        title: format!("{}: fastest over objects and density, moving as in uniform", title(profile)),
         names,
         y_name: "overlapping pairs of an object",
         panels,

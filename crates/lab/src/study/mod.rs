@@ -21,9 +21,10 @@ use anyhow::{Context, Result, bail};
 use page::Page;
 use rayon::prelude::*;
 use sapwise::Tuning;
+use sapwise::algorithm::BackendClass;
 use sapwise_tune::hardware::ParameterId;
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -61,11 +62,12 @@ struct Material {
 }
 
 /// Reads reports, trains and validates a model on them, and writes the page, its figures and the tables into a
-/// folder, which is made when it is missing. Files of an earlier study are replaced.
+/// folder, which is made when it is missing. Files of an earlier study are replaced. The page says how and when it was
+/// `made`.
 ///
 /// # Errors
 /// When a report can't be read, the folder holds something else or takes no file, and when the user asked to stop.
-pub fn study(reports: &[PathBuf], out: &Path, progress: &dyn Progress) -> Result<Summary> {
+pub fn study(reports: &[PathBuf], out: &Path, made: &str, progress: &dyn Progress) -> Result<Summary> {
     prepare(out)?;
     let material = Material::new(read_reports(reports, progress)?, progress)?;
     progress.message("drawing");
@@ -77,6 +79,7 @@ pub fn study(reports: &[PathBuf], out: &Path, progress: &dyn Progress) -> Result
     ];
     let mut page = Page::default();
     page.text(&material.lead());
+    page.text(made);
     curves::section(&material, &mut page, &mut files)?;
     map::section(&material, &mut page, &mut files)?;
     regrets(&material, &mut page);
@@ -152,6 +155,18 @@ impl Material {
         )
     }
 
+    /// The studied profiles, each with its report.
+    fn studied(&self) -> impl Iterator<Item = (&Profile, &Report)> {
+        // Two reports may have the same name, not the same values of all parameters.
+        let alike = |p: &Profile, r: &Report| {
+            p.hardware.parameters.iter().map(|p| p.value).eq(r.hardware.parameters.iter().map(|p| p.value))
+        };
+        self.profiles.iter().filter_map(move |profile| {
+            let own = self.reports.iter().find(|(file, report)| *file == profile.file && alike(profile, report));
+            own.map(|(_, report)| (profile, report))
+        })
+    }
+
     /// For each host its best profile by a rank, in the order of the reports.
     fn best_of_hosts<R: Ord>(&self, rank: impl Fn(&Profile) -> R) -> Vec<&Profile> {
         let mut best: BTreeMap<&str, &Profile> = BTreeMap::new();
@@ -195,6 +210,14 @@ fn regrets(material: &Material, page: &mut Page) {
          the numbers of objects that games are assumed to have, log-normal around 800.",
     );
     page.table(what.trim(), &rows.into_inner());
+    let on_gpu = |p: &Profile| p.algorithms.iter().any(|t| t.id.backend().class() == BackendClass::Gpu);
+    let with_gpu = |p: &&Profile| on_gpu(p) && p.hardware.gpus.iter().any(data::is_real);
+    let hosts: BTreeSet<&str> = material.profiles.iter().filter(with_gpu).map(Profile::machine).collect();
+    match hosts.len() {
+        0 => {}
+        1 => page.lacks("The GPU of a host held out: one host has a real GPU, and it takes two."),
+        n => page.text(&format!("{n} hosts have timings on a real GPU.")),
+    }
 }
 
 #[cfg(test)]

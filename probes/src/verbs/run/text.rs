@@ -8,7 +8,6 @@ use crate::terminal::Terminal;
 use sapwise::AlgorithmId;
 use sapwise_lab::text::{count, duration, grouped};
 use serde_json::{Map, Value, json};
-use std::path::Path;
 
 /// A run with everything that is said about it.
 pub(super) struct Answer<'a> {
@@ -173,8 +172,8 @@ impl Answer<'_> {
         vec![
             format!("{name}: {single}{over_windows:.3} × the oracle of {WINDOW} frames"),
             format!("{switches} switches, {explored} frames explored, medians of {repeats}, choices of the last"),
-            self.tuning(),
-            format!("Made by: {}", command(std::env::args().skip(1))),
+            format!("{} {}, {}.", self.tuning(), sapwise_tune::measure::machine().cpu, crate::date::today()),
+            format!("Made by: {}", shell::own_command()),
         ]
     }
 }
@@ -189,27 +188,5 @@ fn next_step(arguments: &Run, origin: &Origin) -> String {
         (_, None) => shell::again(&["--plot", "run.svg"]),
         (OriginKind::Prediction, _) => format!("probe --out report.json{}", arguments.gpus.words()),
         (_, Some(_)) => format!("run {scene}"),
-    }
-}
-
-/// The command of these words with every file named without its folders, which are of this machine alone.
-fn command(words: impl Iterator<Item = String>) -> String {
-    let short = |word: String| {
-        let (option, path) = word.split_once('=').filter(|_| word.starts_with("--")).unwrap_or(("", &word));
-        let name = Path::new(path).file_name().map_or_else(|| path.into(), |name| name.to_string_lossy());
-        if option.is_empty() { name.into_owned() } else { format!("{option}={name}") }
-    };
-    std::iter::once("sapwise".to_owned()).chain(words.map(short)).collect::<Vec<_>>().join(" ")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_command_below_a_picture_names_no_folder() {
-        let words = ["run", "/a/s.npy", "--tuning", "/b/t.json", "--plot=c/p.svg", "--seed=3", "--no-gpus"];
-        let shown = command(words.into_iter().map(str::to_owned));
-        assert_eq!(shown, "sapwise run s.npy --tuning t.json --plot=p.svg --seed=3 --no-gpus");
     }
 }
