@@ -2,12 +2,15 @@
 """Notes where and when a benchmark measured, for `tools/results.sh`.
 
     tools/measured.py FILE COMMAND SAMPLES    # where and when results/FILE was measured: here and now
+    tools/measured.py --study                 # what was made from all reports, and from which
 
 Needs Python 3.8 only.
 """
 
 import csv
 import datetime
+import hashlib
+import json
 import os
 import pathlib
 import re
@@ -18,17 +21,20 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "results"
 
 
-def note(name, command, samples):
-    """Writes down where and when a file was measured."""
+def here():
     cpu = re.search(r"model name\s*: (.*)", pathlib.Path("/proc/cpuinfo").read_text())
+    return f"{cpu[1] if cpu else 'unknown'} ({len(os.sched_getaffinity(0))} cores)"
+
+
+def note(name, command, samples, machine=None):
+    """Writes down where and when a file was measured."""
     commit = subprocess.run(
         ["git", "rev-parse", "--short=8", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=True
     )
     with open(RESULTS / "provenance.csv", newline="", encoding="utf-8") as file:
         known = [row for row in csv.DictReader(file) if row["file"] != name]
-    machine = f"{cpu[1] if cpu else 'unknown'} ({len(os.sched_getaffinity(0))} cores)"
     known.append(
-        dict(zip(known[0], [name, machine, str(datetime.date.today()), commit.stdout.strip(), samples, command]))
+        dict(zip(known[0], [name, machine or here(), str(datetime.date.today()), commit.stdout.strip(), samples, command]))
     )
     with open(RESULTS / "provenance.csv", "w", newline="", encoding="utf-8") as file:
         out = csv.DictWriter(file, known[0], lineterminator="\n")
@@ -36,4 +42,19 @@ def note(name, command, samples):
         out.writerows(sorted(known, key=lambda row: row["file"]))
 
 
-note(*sys.argv[1:])
+def study():
+    """Notes what `sapwise study` made, with the hash of the model of the same reports: `results.py` compares it."""
+    model = (ROOT / "models/default.json").read_bytes()
+    trained = json.loads(model)["training"]
+    hosts = f"the {trained['validation']['physical_machines']} hosts of datasets/"
+    reports = f"n = {len(trained['trained_on'])} reports"
+    for name in ("influence.csv", "regrets.csv"):
+        note(name, "tools/results.sh influence", reports, hosts)
+    drawn = f"{reports}; model {hashlib.sha256(model).hexdigest()[:8]}"
+    note("field-map.svg", "tools/results.sh influence", drawn, "amd-epyc-zen3-2c")
+
+
+if sys.argv[1:] == ["--study"]:
+    study()
+else:
+    note(*sys.argv[1:])

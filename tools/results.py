@@ -10,6 +10,7 @@ come from results/provenance.csv. `tools/results.sh` measures. Needs Python 3.8 
 
 import collections
 import csv
+import hashlib
 import json
 import pathlib
 import re
@@ -115,8 +116,22 @@ def page_of_peers():
         "Last: p99 over median of `pair-cache` at 10 000.\n\n"
         + table(["scenario", *map(size, sizes), "p99"], body)
         + "\n"
+        + few_frames(cells)
+        + "\n"
         + caption("peers.csv", None)
         + "\n"
+    )
+
+
+def few_frames(cells):
+    """How many frames the large cells have, and which cells are missing."""
+    least_of = lambda cell: min(int(row["frames"]) for name, row in cell.items() if name != "ratio")
+    counts = collections.Counter(least_of(cell) for (_, n), cell in cells.items() if n >= 100_000)
+    frames, most = counts.most_common(1)[0]
+    missing = [f"`{scene}` at {size(n)}" for (scene, n), cell in cells.items() if not cell["ratio"]]
+    return (
+        f"From 100 000 boxes on, {most} of {sum(counts.values())} cells have {frames} frames. "
+        f"No ratio: {', '.join(missing)}.\n"
     )
 
 
@@ -245,15 +260,26 @@ def inline_table():
                 f"{geometric_mean(oracle):.3f}",
             ]
         )
-    return table(["host", "tuning", "runs", "× single", "worst", "× oracle"], body)
+    return table(["host", "tuning", "runs", "× single", "worst", "× oracle"], body) + on_the_same_scenes(groups)
+
+
+def on_the_same_scenes(groups):
+    """The predicted tuning on the scenes of each other tuning: the rows have different scenes."""
+    told = []
+    for (host, tuning), runs in groups.items():
+        scenes = {r["scene"] for r in runs}
+        same = [float(r["over_single"]) for r in groups[host, "predicted"] if r["scene"] in scenes]
+        if tuning != "predicted":
+            told.append(f"{geometric_mean(same):.3f} in the runs of `{tuning}`")
+    return f"\n`predicted` is {', '.join(told)}.\n"
 
 
 def inline_sentence():
-    single = [float(r["over_single"]) for r in rows("inline.csv") if r["tuning"] == "predicted"]
+    runs = {r["scene"]: float(r["over_single"]) for r in rows("inline.csv") if r["tuning"] == "predicted"}
+    single, worst = list(runs.values()), max(runs, key=runs.get)
     return (
-        f"- A running program takes {geometric_mean(single):.2f}× the time of the best single algorithm, "
-        "known only in hindsight "
-        f"(geometric mean of {len(single)} runs, [details](docs/methodology.md#in-a-running-program)).\n"
+        f"- A running program takes {geometric_mean(single):.2f}× the time of the best single algorithm in hindsight "
+        f"(geometric mean of {len(single)} runs; at worst {runs[worst]:.2f}×, `{worst}`; [details](docs/methodology.md#in-a-running-program)).\n"
     )
 
 
@@ -284,7 +310,46 @@ def strategies():
                 "seen_games_percent": percent(method["mean_regret_in_games"]),
             }
         )
+    noise = validation["floor"]
+    for strategy, of in (("floor", noise["cells"]["all"]), ("another run's full sweep", noise["full_sweep"]["all"])):
+        row = dict.fromkeys(kept[0], "")
+        row.update(
+            model=model["name"],
+            commit="this one",
+            hosts=str(validation["physical_machines"]),
+            strategy=strategy,
+            seen_percent=percent(of["all"]),
+            seen_games_percent=percent(of["in_games"]),
+        )
+        kept.append(row)
     return kept, model["name"]
+
+
+def ranges_of_hosts():
+    """The least and the largest regret of a host in an unseen scenario, by strategy, in percent."""
+    hosts = {}
+    for row in rows("regrets.csv"):
+        if row["unseen_share"]:
+            hosts.setdefault(row["strategy"], []).append(100 * float(row["unseen_share"]))
+    own = {row["strategy"]: row["unseen_percent"] for row in strategies()[0]}
+    for strategy, regrets in hosts.items():
+        mean = f"{statistics.mean(regrets):.1f}"
+        assert mean == own[strategy], f"regrets.csv is of another model: {strategy} {mean}, not {own[strategy]}"
+    return {strategy: (f"{min(regrets):.1f}", f"{max(regrets):.1f}") for strategy, regrets in hosts.items()}
+
+
+def map_sentence():
+    known = next(row for row in rows("provenance.csv") if row["file"] == "field-map.svg")
+    return f"{known['machine']}, held out; {known['date']}.\n"
+
+
+def stale_map():
+    """Why the map of the README is older than the model, if it is."""
+    known = next(row for row in rows("provenance.csv") if row["file"] == "field-map.svg")
+    model = hashlib.sha256((ROOT / "models/default.json").read_bytes()).hexdigest()[:8]
+    if not known["samples"].endswith(f"model {model}"):
+        return "pictures/field-map.svg is older than models/default.json; `tools/results.sh influence` draws it"
+    return None
 
 
 SHOWN = {
@@ -303,7 +368,7 @@ def readme_strategies():
     ]
     hosts = next(iter(own.values()))["hosts"]
     return (
-        f"Time lost against the best choice, each of {hosts} machines held out in turn, and the scene too "
+        f"Time lost against the best choice, machine (one of {hosts}) and scene held out "
         "([all strategies](results/heldout.md)):\n\n" + table(["strategy", "all sizes", "around 800 boxes"], body)
     )
 
@@ -312,41 +377,34 @@ def blind_table():
     body = []
     for row in rows("heldout.csv"):
         if not re.fullmatch(r"\d+t.*|avx2.*|portable.*", row["profile"]):
-            body.append(
-                [
-                    row["host"],
-                    row["profile"],
-                    row["model_trained_on"],
-                    f"{row['regret_all_percent']} ({row['regret_games_percent']})",
-                ]
-            )
-    return table(["host", "profile", "model trained on", "regret, %"], body)
+            judged = f"{row['regret_all_percent']} ({row['regret_games_percent']})"
+            body.append([row[k] for k in ("host", "profile", "date", "model_trained_on", "model_commit")] + [judged])
+    return table(["host", "profile", "date", "model trained on", "its commit", "regret, %"], body)
 
 
 def page_of_heldout():
-    kept, _ = strategies()
-    dash = lambda value: value or "-"
+    kept, name = strategies()
+    ranges = ranges_of_hosts()
     body = []
-    for model in dict.fromkeys(row["model"] for row in kept):
-        of_model = [row for row in kept if row["model"] == model]
-        for row in of_model:
-            if row["unseen_percent"]:
-                body.append(
-                    [
-                        model,
-                        row["strategy"],
-                        *(dash(row[k]) for k in ("unseen_percent", "unseen_games_percent", "seen_percent")),
-                    ]
-                )
+    for row in kept:
+        if row["unseen_percent"] or (row["model"], row["strategy"]) == (name, "floor"):
+            cells = [row[k] or "-" for k in ("unseen_percent", "unseen_games_percent", "seen_percent")]
+            if row["model"] == name and row["strategy"] in ranges:
+                cells[0] += " ({}–{})".format(*ranges[row["strategy"]])
+            body.append([row["model"], row["strategy"], *cells])
     threads = [r for r in rows("heldout.csv") if re.fullmatch(r"\d+t.*|avx2.*|portable.*", r["profile"])]
-    own = [[r["host"], r["profile"], r["model_trained_on"], r["regret_all_percent"]] for r in threads]
+    judged = [
+        [r["host"], r["profile"], r["model_commit"], "{regret_all_percent} ({regret_games_percent})".format(**r)]
+        for r in threads
+    ]
     return (
-        "# Machines held out\n\nRegret in percent: time of the choice over that of the best, less one. "
-        "*In games*: weighted around 800 boxes. "
-        "The model of six hosts is of commit 22f9246, whose algorithms are older.\n\n"
+        "# Machines held out\n\n"
+        "[Regret](../docs/methodology.md#regret-and-what-is-held-out) in percent; in parentheses "
+        "least–largest host ([each](regrets.csv)). *In games*: weighted around 800 boxes. "
+        "`six-hosts`: commit 22f9246, older algorithms.\n\n"
         + table(["model", "strategy", "unseen scenario", "in games", "seen scenario"], body)
         + "\nHosts measured after the model was committed, by profile:\n\n"
-        + table(["host", "profile", "model trained on", "regret"], own)
+        + table(["host", "profile", "model", "regret (in games)"], judged)
         + "\n"
         + caption("heldout.csv", None)
         + "\n"
@@ -458,6 +516,7 @@ def spliced():
             "peers": readme_peers() + "\n" + short_caption("peers.csv", "peers.md") + "\n",
             "gpu": gpu_sentence(),
             "strategies": readme_strategies(),
+            "field-map": map_sentence(),
             "predict": sample(),
             "inline": inline_sentence(),
         },
@@ -507,6 +566,9 @@ def check():
     stale = [path for path, text in written().items() if not path.exists() or path.read_text(encoding="utf-8") != text]
     for path in stale:
         print(f"{path.relative_to(ROOT)} differs from results/*.csv", file=sys.stderr)
+    old = stale_map()
+    if old:
+        sys.exit(old)
     if stale:
         sys.exit("`tools/results.py` writes results/*.md and the blocks of the documents anew")
 

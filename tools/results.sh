@@ -34,7 +34,7 @@ inline() {
   note inline.csv inline "n = 4 repeats of 600 frames"
 }
 c() { tools/c.sh bench; note c.csv c "medians over all frames"; }
-python() { tools/python.sh bench; note python.csv python "samples as in the file"; }
+python() { tools/python.sh bench; note python.csv python "n = 3 to 200 samples"; }
 avian() { tools/avian.sh bench; note avian.csv avian "medians over all steps"; }
 web() { tools/web.sh bench; note web.csv web "medians over all frames"; }
 probes() { tools/web.sh probes; note web-probes.csv probes "n = 20 probes"; }
@@ -48,11 +48,14 @@ heldout() {
   done
   tools/reference/regret.py "$work" "datasets/$SAPWISE_HOST"/*.json
 }
-# Which parameter moves which crossover, from all reports. Measures nothing.
+# What follows from all reports: which parameter moves which crossover, the regret of each strategy on each host held
+# out, and the map of the README. Measures nothing.
 influence() {
   built
   "$folder/release/sapwise" study datasets --out "$work/study" > "$work/study.txt"
-  mv "$work/study/influence.csv" results/influence.csv
+  mv "$work/study/influence.csv" "$work/study/regrets.csv" results/
+  mv "$work/study/field-map.svg" pictures/
+  tools/measured.py --study
 }
 # Bytes of what is shipped, stripped.
 sizes() {
