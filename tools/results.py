@@ -487,22 +487,15 @@ def shown(name):
 TOGETHER = {"web": ("web.csv", "web-probes.csv")}
 
 
-# What a reader of a page asks first.
-NOTES = {
-    "avian": "Likely: the bodies of `pile` fall asleep midway, so its median step falls on either side.\n\n",
-}
-
-
 def small_pages():
     """A table of each small file that was measured."""
     for name in ("sizes", "builds", "memory", "c", "avian", "web"):
         files = [file for file in TOGETHER.get(name, (f"{name}.csv",)) if (RESULTS / file).exists()]
         if files:
-            note = NOTES.get(name, "")
             kept = [row for file in files for row in shown(file)]
             captions = "\n".join(caption(file, None) + "\n" for file in files)
             body = table(list(kept[0]), [row.values() for row in kept])
-            yield f"{name}.md", f"# {name.capitalize()}\n\n{note}{body}\n{captions}"
+            yield f"{name}.md", f"# {name.capitalize()}\n\n{body}\n{captions}"
 
 
 def sample():
