@@ -108,14 +108,23 @@ fn range(values: impl Iterator<Item = f64>, wider: f64) -> std::ops::Range<f64> 
     if low <= high { low / wider..high * wider } else { 0.1..10.0 }
 }
 
-/// The base of the numbers on a logarithmic axis: ten, or two over less than two decades, where powers of ten are few.
+/// The base of the numbers on a logarithmic axis: ten, less over a short one, where powers of ten are few.
 fn base(range: &std::ops::Range<f64>) -> f64 {
-    if range.end < 100.0 * range.start { 2.0 } else { 10.0 }
+    match range.end / range.start {
+        ratio if ratio < 5.0 => std::f64::consts::SQRT_2,
+        ratio if ratio < 100.0 => 2.0,
+        _ => 10.0,
+    }
 }
 
 /// A number on an axis: `100 000`, `0.01`.
 fn tick(value: &f64) -> String {
-    if *value >= 1000.0 { crate::text::grouped(*value as u64) } else { format!("{}", (value * 1e6).round() / 1e6) }
+    let rounded = |fine: f64| format!("{}", (value * fine).round() / fine);
+    match *value {
+        v if v >= 1000.0 => crate::text::grouped(v as u64),
+        v if v >= 1.0 => rounded(100.0),
+        _ => rounded(1e6),
+    }
 }
 
 /// Areas for so many panels, in rows of up to three.
