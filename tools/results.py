@@ -270,8 +270,8 @@ def on_the_same_scenes(groups):
         scenes = {r["scene"] for r in runs}
         same = [float(r["over_single"]) for r in groups[host, "predicted"] if r["scene"] in scenes]
         if tuning != "predicted":
-            told.append(f"{geometric_mean(same):.3f} in the runs of `{tuning}`")
-    return f"\n`predicted` is {', '.join(told)}.\n"
+            told.append(f"of `{tuning}`: {geometric_mean(same):.3f}")
+    return f"\n`predicted` in the runs {'; '.join(told)}.\n"
 
 
 def inline_sentence():
@@ -476,8 +476,10 @@ NOT_SHOWN = (
 
 
 def shown(name):
-    """The rows of a file without the columns that are not shown, the deciles in one cell."""
+    """The rows of a file without the columns that are not shown, deciles in one cell, quartiles behind the median."""
     for row in rows(name):
+        if "quartile_3_ms" in row:
+            row["median_ms"] += " ({quartile_1_ms}–{quartile_3_ms})".format(**row)
         if "p90" in row:
             row["p10"] += f"–{row.pop('p90')}"
         yield {"p10–p90" if k == "p10" else k: v for k, v in row.items() if k not in NOT_SHOWN}
