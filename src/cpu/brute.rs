@@ -61,8 +61,7 @@ impl BroadPhase for Brute {
     }
 
     fn prepare(&mut self, objects: usize) {
-        // The frame that needs the memory or the threads reports a refusal.
-        let _ = self.workers.fit(objects.saturating_mul(objects) / (2 * PAIRS_PER_BOX)).start();
+        // The frame that needs the memory reports a refused allocation.
         let _ = self.columns.resize(objects).and_then(|()| ensure(&mut self.order, objects, POSITIONS));
     }
 }

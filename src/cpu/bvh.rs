@@ -49,8 +49,7 @@ impl BroadPhase for Bvh {
     }
 
     fn prepare(&mut self, objects: usize) {
-        // The frame that needs the memory or the threads reports a refusal.
-        let _ = self.workers.fit(objects).start();
+        // The frame that needs the memory reports a refused allocation.
         let _ = self.tree.reserve(objects);
     }
 }

@@ -141,8 +141,7 @@ impl BroadPhase for GridSap {
     }
 
     fn prepare(&mut self, objects: usize) {
-        // The frame that needs the memory or the threads reports a refusal. A box stands in 1.6 strips on average.
-        let _ = self.workers.fit(objects).start();
+        // The frame that needs the memory reports a refused allocation. A box stands in 1.6 strips on average.
         let share = objects / self.bins.len();
         for bin in &mut self.bins {
             let _ = ensure(&mut bin.entries, share + share * 5 / 8, "boxes in strips");

@@ -136,8 +136,7 @@ impl BroadPhase for PairCache {
     }
 
     fn prepare(&mut self, objects: usize) {
-        // The frame that needs the memory or the threads reports a refusal.
-        let _ = self.widths[self.width].fit(objects).start();
+        // The frame that needs the memory reports a refused allocation.
         let _ = self.tree.reserve(objects).and_then(|()| self.grown.reserve(objects));
     }
 

@@ -70,8 +70,7 @@ impl BroadPhase for Sap {
     }
 
     fn prepare(&mut self, objects: usize) {
-        // The frame that needs the memory or the threads reports a refusal.
-        let _ = self.workers.fit(objects).start();
+        // The frame that needs the memory reports a refused allocation.
         let _ = self.resize(objects);
     }
 }
