@@ -16,8 +16,10 @@ pub(crate) struct Helpers {
     /// more than helpers.
     pub(crate) count: u32,
     pinned: bool,
-    /// Nothing before the start; then the helpers, or why the system refused them.
-    team: OnceLock<Result<Team, Unavailable>>,
+    /// Nothing before the start.
+    team: OnceLock<Team>,
+    #[cfg(test)]
+    refused: std::sync::atomic::AtomicBool,
 }
 
 /// A pool of helpers that runs.
@@ -40,35 +42,44 @@ struct Shared {
 impl Helpers {
     /// Makes `count` helpers, without starting them.
     pub(crate) fn new(count: u32, pinned: bool) -> Self {
-        Self { count, pinned, team: OnceLock::new() }
+        Self {
+            count,
+            pinned,
+            team: OnceLock::new(),
+            #[cfg(test)]
+            refused: false.into(),
+        }
     }
 
     /// Takes the threads of a program's pool, which may run on any core.
     pub(crate) fn of(pool: Arc<rayon::ThreadPool>) -> Self {
         let count = u32::try_from(pool.current_num_threads()).unwrap_or(u32::MAX);
-        Self { count, pinned: false, team: OnceLock::from(Ok(Team::over(pool, None, true))) }
+        Self { team: OnceLock::from(Team::over(pool, None, true)), ..Self::new(count, false) }
     }
 
     /// Starts the helpers, unless they run.
     ///
     /// # Errors
-    /// [`Unavailable::ThreadsRefused`], now and whenever these helpers are asked for again.
+    /// [`Unavailable::ThreadsRefused`]. The next call asks the system again.
     pub(crate) fn start(&self) -> Result<(), Unavailable> {
-        self.team().map(drop).map_err(Unavailable::clone)
+        #[cfg(test)]
+        if self.refused.load(std::sync::atomic::Ordering::Relaxed) {
+            return Err(Unavailable::ThreadsRefused { threads: self.count, message: "a test".to_owned() });
+        }
+        if self.team.get().is_none() {
+            // Of two callers at once, one starts in vain.
+            let _ = self.team.set(Team::new(self.count, self.pinned)?);
+        }
+        Ok(())
     }
 
-    /// Returns whether the system has refused them.
-    pub(crate) fn are_refused(&self) -> bool {
-        matches!(self.team.get(), Some(Err(_)))
-    }
-
-    fn team(&self) -> Result<&Team, &Unavailable> {
-        self.team.get_or_init(|| Team::new(self.count, self.pinned)).as_ref()
+    fn team(&self) -> Option<&Team> {
+        self.start().ok().and_then(|()| self.team.get())
     }
 
     /// Begins a frame with up to `count` helpers, who stay between its phases until [`end_frame`](Self::end_frame).
     pub(crate) fn begin_frame(&self, count: usize) {
-        if let Ok(team) = self.team() {
+        if let Some(team) = self.team() {
             team.follow_caller();
             team.shared.phases.begin_frame(count.min(team.most()), || team.invite());
         }
@@ -76,7 +87,7 @@ impl Helpers {
 
     /// Ends a frame.
     pub(crate) fn end_frame(&self) {
-        if let Ok(team) = self.team() {
+        if let Some(team) = self.team.get() {
             team.shared.phases.end_frame();
         }
     }
@@ -84,7 +95,7 @@ impl Helpers {
     /// Runs `work` here and on up to `count` helpers that come while it lasts. Returns when nobody works on it any
     /// more. The caller runs no other job of its pool meanwhile. Without helpers it does all.
     pub(crate) fn run(&self, count: usize, work: &(dyn Fn() + Sync)) {
-        let Ok(team) = self.team() else { return work() };
+        let Some(team) = self.team() else { return work() };
         team.follow_caller();
         let most = team.most();
         team.shared.phases.run(count.min(most), most, work, || team.invite());
@@ -96,11 +107,10 @@ impl Helpers {
         self.team().unwrap().shared.phases.coming()
     }
 
-    /// Does as if the system refused them. They must not have been started.
+    /// Does from now on as if the system refused them, or no more.
     #[cfg(test)]
-    pub(crate) fn refuse(&self) {
-        let refused = Unavailable::ThreadsRefused { threads: self.count, message: "a test".to_owned() };
-        self.team.set(Err(refused)).unwrap();
+    pub(crate) fn refuse(&self, refused: bool) {
+        self.refused.store(refused, std::sync::atomic::Ordering::Relaxed);
     }
 }
 

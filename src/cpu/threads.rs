@@ -85,11 +85,6 @@ impl Threads {
         }
         let make = || Arc::new(Helpers::new(count, self.pinned));
         let mut pools = self.pools.lock().unwrap_or_else(PoisonError::into_inner);
-        let pool = pools.entry((count, self.pinned)).or_insert_with(make);
-        // The system may start now what it once refused.
-        if pool.are_refused() {
-            *pool = make();
-        }
-        Arc::clone(pool)
+        Arc::clone(pools.entry((count, self.pinned)).or_insert_with(make))
     }
 }

@@ -121,7 +121,7 @@ fn refused_threads_are_an_error_of_the_frame() {
     let ids = cpu::METHODS.iter().map(|method| AlgorithmId::cpu(method.name, 3));
     let made: Vec<_> = ids.map(|id| (registry.create(&id).unwrap(), id)).collect();
     let mut pairs = Pairs::new();
-    registry.threads.helpers(2).refuse();
+    registry.threads.helpers(2).refuse(true);
     for (mut algorithm, id) in made {
         let Err(Error::Unavailable { algorithm, reason }) = algorithm.find_pairs(&boxes, &mut pairs) else {
             panic!("{id} ran on refused threads")
@@ -134,7 +134,8 @@ fn refused_threads_are_an_error_of_the_frame() {
         adaptive.last_decision().unwrap().algorithm.to_string()
     };
     assert_eq!(ran(&mut adaptive), "pair-cache@cpu1");
-    // The system is asked anew for what is made from now on.
+    // The system is asked anew in each frame.
+    registry.threads.helpers(2).refuse(false);
     adaptive.revive(&registry).unwrap();
     assert_eq!(ran(&mut adaptive), "pair-cache@cpu3");
 }
