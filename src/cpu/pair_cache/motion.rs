@@ -171,7 +171,7 @@ impl Motion {
         self.keeping.map(|k| k.margin)
     }
 
-    /// Begins to keep pairs if that promises to pay. Looks ever more rarely where it does not.
+    /// Begins to keep pairs if that promises to pay. Looks ever more rarely if it promises nothing.
     fn look(&mut self, plan: &FramePlan, boxes: &[Aabb]) {
         if self.pause == 0 {
             self.keeping = self.begin(plan, boxes);
@@ -340,7 +340,7 @@ impl Motion {
         if k.frames == PROVEN {
             self.most_margin = MARGINS[MARGINS.len() - 1];
         }
-        self.prices.pays(took, k.cost, scratch)
+        self.prices.pays(took, k.cost, scratch, rebuilt)
     }
 
     /// How far the boxes moved since the frame before, and how many pairs for each there are; `None` where nobody
