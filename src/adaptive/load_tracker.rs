@@ -103,7 +103,9 @@ impl LoadTracker {
     fn is_sample_due(&self, objects: u32) -> bool {
         let Some(sampled) = self.sampled else { return true };
         let rested = self.age >= SAMPLE_EVERY || drift(objects, sampled) > DRIFTED;
-        rested && self.since_sample_ns * SAMPLE_SHARE >= self.sample_ns
+        // A sample of fewer boxes takes less.
+        let fewer = f64::from(objects.min(sampled)) / f64::from(sampled.max(1));
+        rested && self.since_sample_ns * SAMPLE_SHARE >= self.sample_ns * fewer
     }
 
     /// Compares the boxes with the remembered ones of the previous frame, if there are any. Returns whether the pace

@@ -194,7 +194,8 @@ impl Runner {
         clock::counted::spend(clock::counted::DECISION_NS);
         self.catch_up();
         let is_first = self.choice.is_none() && self.running.is_none();
-        let spent_ns = if is_first && boxes.len() < FIRST_SAMPLED && self.policy.has_steps() {
+        let by_count = is_first && !self.policy.has_learned() && boxes.len() < FIRST_SAMPLED;
+        let spent_ns = if by_count && self.policy.has_steps() {
             self.tracker.begin(boxes);
             self.choice = self.choose_among(|policy, load| policy.choose_first(load.objects));
             0.0
