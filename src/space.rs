@@ -42,8 +42,7 @@ pub use view::View;
 const IDLE: u64 = 8;
 
 /// Bodies begin to rest when those that could are more than this many times the others. All wake when the resting ones
-/// are fewer than half this many times the others: then one search for all is cheaper, also if they are all fixed, unless
-/// the others move little.
+/// are fewer than half this many times the others: then one search for all is cheaper, also if they are all fixed.
 const MANY: usize = 8;
 
 /// Fewest bodies that rest.
@@ -70,8 +69,8 @@ const FEWEST: usize = 64;
 /// # Ok::<(), sapwise::Error>(())
 /// ```
 ///
-/// Every call takes effect at the next [`update`](Self::update); until then, [`pairs`](Self::pairs) and the other
-/// lists show the last one. A call that fails changes nothing.
+/// Pairs and queries follow a call from the next [`update`](Self::update) on; a removed body is gone from queries,
+/// [`contains`](Self::contains) and [`len`](Self::len) at once. A call that fails changes no body.
 ///
 /// [`pairs`](Self::pairs), [`begun`](Self::begun) and [`ended`](Self::ended) depend on the calls alone, not on the
 /// algorithm, the number of threads or the time: the same calls give the same lists in the same order.

@@ -4,7 +4,8 @@ use std::fmt;
 use std::num::NonZeroU64;
 
 /// Names a body of a [`Space`](crate::Space), until it is removed. No other body gets the same handle before its slot
-/// has had four billion bodies. Handles of two spaces may be equal: don't mix them.
+/// has had four billion bodies, unless the space goes back to an earlier state by `clone_from`. Handles of two spaces
+/// may be equal: don't mix them.
 ///
 /// 64 bits: slot, then generation. Handles sort by slot. 0 is no handle, so `Option<Handle>` has 64 bits too. With the
 /// feature `serde`, a handle is this number. In memory it is a [`NonZeroU64`].

@@ -93,7 +93,9 @@ struct Error : std::runtime_error {
 template <class T> using Result = T;
 using Done = void;
 inline void done(Status status) { if (status != SW_OK) throw Error(status); }
-[[noreturn]] inline Done unequal() { throw Error(SW_INVALID_ARGUMENT, "give one handle, and one body or one for all, for each box"); }
+[[noreturn]] inline Done unequal() {
+    throw Error(SW_INVALID_ARGUMENT, "give one handle, and one body or one for all, for each box");
+}
 template <class T> T result(Status status, const T &value) { done(status); return value; }
 #endif
 

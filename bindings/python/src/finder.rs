@@ -219,8 +219,8 @@ impl PyBroadPhase {
         Ok(())
     }
 
-    /// Return the pairs of the last frame that the previous one did not have, sorted: ndarray, shape (k, 2); ids (int64)
-    /// if the frames have ids, else positions (uint32).
+    /// Return the pairs of the last frame that the previous one did not have, sorted: ndarray, shape (k, 2), of ids
+    /// (int64) if the frames have ids, else of positions (uint32).
     fn begun<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.changed(py, true)
     }

@@ -93,8 +93,9 @@ fn worlds<'py>(
 /// Find all pairs of overlapping boxes.
 ///
 /// Boxes are closed: those that touch overlap. For consecutive frames use ``BroadPhase``, which is faster there. The
-/// memory and the work of a call stay for the next one, so the same boxes are found faster again. Chooses the algorithm by the tuning of this machine that ``predict`` or ``BroadPhase`` has
-/// saved, else by built-in thresholds. It measures nothing. ``last_decision`` returns the choice and its reason.
+/// memory and the work of a call stay for the next one, so the same boxes are found faster again. Chooses the algorithm
+/// by the tuning of this machine that ``predict`` or ``BroadPhase`` has saved, else by built-in thresholds. It measures
+/// nothing. ``last_decision`` returns the choice and its reason.
 ///
 /// Parameters
 /// ----------

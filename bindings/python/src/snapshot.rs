@@ -10,7 +10,7 @@ use pyo3::types::PyBytes;
 use sapwise::Space;
 
 /// Begins a snapshot. The number rises with its layout.
-const HEAD: &[u8] = b"sapwise space 1\n";
+const HEAD: &[u8] = b"sapwise space 2\n";
 
 /// Returns what `pickle` keeps of a space: `restored_space` and its arguments.
 pub(crate) fn reduced<'py>(py: Python<'py>, held: &Held<Space>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
