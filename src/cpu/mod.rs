@@ -40,7 +40,7 @@ pub(crate) use world::WorldSearch;
 use crate::broad_phase::BroadPhase;
 use crate::error::Error;
 
-/// A built-in method: one row here puts it into every test, probe, sweep and figure.
+/// A built-in method: a row here puts it into every registry, contract, probe and sweep.
 pub(crate) struct Method {
     /// The part of the id before the `@`.
     pub(crate) name: &'static str,
