@@ -307,8 +307,8 @@ sw_space *sw_space_new_with(const sw_options *options);
 // nothing is freed, if a query of it runs: don't free it in a callback.
 sw_status sw_space_free(sw_space *space);
 
-// Makes a copy that continues as the original would: the same calls give the same lists. It has its own threads, and
-// learns by itself. NULL on failure: SW_NULL, SW_BUSY or SW_PANIC.
+// Makes a copy that continues as the original would: the same calls give the same lists. It runs on the same helper
+// threads, and learns by itself. NULL on failure: SW_NULL, SW_BUSY or SW_PANIC.
 sw_space *sw_space_clone(const sw_space *space);
 
 // Makes a space what another one is, as a game does that goes back to an earlier state. It keeps its threads and
