@@ -176,12 +176,8 @@ pub unsafe extern "C-unwind" fn sw_space_insert_many(
 ) -> sw_status {
     // SAFETY: of the caller.
     unsafe {
-        sw_space::change(space, |space| {
-            let boxes = Boxes::new(boxes, n, stride, max)?;
-            check(handles, n, "handles")?;
-            let new = space.insert_all(boxes.to_slice(&mut Vec::new())?, sw_body::or_default(body)?)?;
-            new.iter().enumerate().for_each(|(k, new)| handles.add(k).write(new.to_bits()));
-            Ok(())
+        insert_boxes(space, (boxes, n, stride, max), handles, |space, boxes| {
+            Ok(space.insert_all(boxes, sw_body::or_default(body)?)?)
         })
     }
 }
@@ -199,17 +195,34 @@ pub unsafe extern "C-unwind" fn sw_space_insert_bodies(
 ) -> sw_status {
     // SAFETY: of the caller.
     unsafe {
+        insert_boxes(space, (boxes, n, stride, max), handles, |space, boxes| {
+            let bodies = slice(bodies, n, "bodies")?;
+            bodies.iter().try_for_each(|body| body.read().map(drop))?;
+            let new = space.insert_all(boxes, Body::default())?;
+            // All are valid.
+            new.iter().zip(bodies).try_for_each(|(new, body)| Ok::<_, Failure>(space.set_body(*new, body.read()?)?))?;
+            Ok(new)
+        })
+    }
+}
+
+/// Inserts boxes by `insert`, and writes their handles.
+///
+/// # Safety
+/// As of [`sw_space_insert_many`].
+unsafe fn insert_boxes(
+    space: *mut sw_space,
+    (boxes, n, stride, max): (*const f32, usize, usize, *const f32),
+    handles: *mut u64,
+    insert: impl FnOnce(&mut Space, &[Aabb]) -> Result<Vec<Handle>, Failure>,
+) -> sw_status {
+    // SAFETY: of the caller.
+    unsafe {
         sw_space::change(space, |space| {
             let boxes = Boxes::new(boxes, n, stride, max)?;
             check(handles, n, "handles")?;
-            let bodies = slice(bodies, n, "bodies")?;
-            bodies.iter().try_for_each(|body| body.read().map(drop))?;
-            let new = space.insert_all(boxes.to_slice(&mut Vec::new())?, Body::default())?;
-            for (k, (new, body)) in new.into_iter().zip(bodies).enumerate() {
-                // Both are valid.
-                space.set_body(new, body.read()?)?;
-                handles.add(k).write(new.to_bits());
-            }
+            let new = insert(space, boxes.to_slice(&mut Vec::new())?)?;
+            new.iter().enumerate().for_each(|(k, new)| handles.add(k).write(new.to_bits()));
             Ok(())
         })
     }
