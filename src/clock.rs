@@ -34,7 +34,7 @@ pub(crate) fn is_fine() -> bool {
     tick().is_some_and(|tick| tick <= FINE)
 }
 
-/// Returns the nanoseconds since then.
+/// Returns the nanoseconds since then. By way of 64 bits, for which processors have an instruction.
 pub(crate) fn elapsed_ns(since: Instant) -> f64 {
     since.elapsed().as_nanos() as u64 as f64
 }

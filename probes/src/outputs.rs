@@ -33,8 +33,8 @@ pub(crate) fn refuse_overwriting(inputs: &[PathBuf], outputs: &[&PathBuf]) -> Re
     Ok(())
 }
 
-/// Tries whether a file can be written, by a temporary file in its folder, which is created if it is missing. A device or
-/// a pipe is not tried.
+/// Tries whether a file can be written, by a temporary file in its folder, which is created if it is missing. A device
+/// or a pipe is not tried.
 ///
 /// # Errors
 /// Names the path and what to do.

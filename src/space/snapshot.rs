@@ -182,8 +182,8 @@ impl Snapshot {
     }
 }
 
-/// Saves the bodies with their handles, the three lists of pairs and the limit. A restored space goes on as the original
-/// would: the same calls give the same lists.
+/// Saves the bodies with their handles, the three lists of pairs and the limit. A restored space goes on as the
+/// original would: the same calls give the same lists.
 ///
 /// The tuning, the algorithms and their threads are not saved, because they belong to a machine and a program: a
 /// restored space searches as [`Space::new`] does. Restore into a space that searches as you want with

@@ -37,9 +37,9 @@ impl Searcher for Space {
 
 /// Bodies with handles, the pairs of those that overlap, and queries.
 ///
-/// Set the bodies that moved, then ``update``. Bodies that are not set cost nothing once they are by far the most. Pairs
-/// and queries follow a call from the next ``update`` on. A call that fails changes no body. As a context manager it
-/// saves what it has learned when the block ends.
+/// Set the bodies that moved, then ``update``. Bodies that are not set cost nothing once they are by far the most.
+/// Pairs and queries follow a call from the next ``update`` on. A call that fails changes no body. As a context manager
+/// it saves what it has learned when the block ends.
 ///
 /// Parameters
 /// ----------

@@ -14,8 +14,8 @@ const MOST_LOST: f32 = 4.0;
 /// One frame counts as at most this many from scratch.
 const MOST_OF_FRAME: f32 = 4.0;
 
-/// A frame that takes this many times the mean one, with none such in so many frames before, was interrupted by the
-/// system, and counts as a mean one. On a busy host two of these within ten frames stopped keeping for 500.
+/// A frame that takes so many times the mean was interrupted by the system, unless another one took as long within so
+/// many frames before. It counts as the mean. Counted in full, two within ten frames stopped keeping for 500.
 const INTERRUPTED: f32 = 2.0;
 const APART: u32 = 16;
 
