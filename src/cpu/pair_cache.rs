@@ -288,7 +288,7 @@ mod tests {
 
     /// Returns the shift, in edges, of boxes that go one way for eight frames and then back.
     fn to_and_fro(frame: usize) -> f32 {
-        if (frame / 8).is_multiple_of(2) { 0.08 } else { -0.08 }
+        if (frame / 8).is_multiple_of(2) { 0.04 } else { -0.04 }
     }
 
     /// Returns the kept pairs after each frame, in which boxes move by that shift. `known`: the plan has the motion.

@@ -173,15 +173,16 @@ impl Motion {
 
     /// Begins to keep pairs if that promises to pay. Looks ever more rarely if it promises nothing.
     fn look(&mut self, plan: &FramePlan, boxes: &[Aabb]) {
-        if self.pause == 0 {
+        if self.pause > 0 {
+            self.pause -= 1;
+        } else {
             self.keeping = self.begin(plan, boxes);
             self.prices.fade(1 + u64::from(self.next_pause));
-            (self.pause, self.next_pause) = match self.keeping {
-                Some(_) => (0, 0),
-                None => (self.next_pause, (2 * self.next_pause + 1).min(MOST_PAUSE)),
-            };
-        } else {
-            self.pause -= 1;
+            if self.keeping.is_some() {
+                (self.next_pause, self.displacement) = (0, Displacement::default());
+                return;
+            }
+            (self.pause, self.next_pause) = (self.next_pause, (2 * self.next_pause + 1).min(MOST_PAUSE));
         }
         if self.pause == 0 {
             self.displacement.watch(boxes);
@@ -205,7 +206,9 @@ impl Motion {
         if too_many || failed.tests > 0.5 * failed.cost {
             self.most_margin = (0.5 * failed.margin.share).max(MARGINS[0]);
         }
-        self.prices.failed(failed.cost, too_many);
+        self.prices.failed(too_many);
+        // The frame after the next one compares its boxes with those of the next one.
+        self.pause = 1;
     }
 
     /// Goes on with another number of threads. Which margin failed on others says little.
@@ -340,13 +343,14 @@ impl Motion {
         if k.frames == PROVEN {
             self.most_margin = MARGINS[MARGINS.len() - 1];
         }
-        self.prices.pays(took, k.cost, scratch, rebuilt)
+        self.prices.pays(took, now, scratch)
     }
 
     /// How far the boxes moved since the frame before, and how many pairs for each there are; `None` where nobody
     /// knows.
     fn known(&self, plan: &FramePlan, boxes: &[Aabb]) -> Option<(f32, f32)> {
-        let moved = plan.moved().or_else(|| self.displacement.motion(boxes).map(|m| m.moved))?;
+        // What is told may be of some frames ago.
+        let moved = self.displacement.motion(boxes).map(|m| m.moved).or(plan.moved())?;
         // What this method has found itself may be of long ago.
         let density = plan.pairs().map(|pairs| pairs as f32 / boxes.len().max(1) as f32).or(self.density)?;
         Some((moved as f32, density))
@@ -364,7 +368,7 @@ impl Motion {
         let margins = MARGINS.into_iter().filter(|&m| m <= self.most_margin);
         let best = margins.min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(MARGINS[0]);
         let kept = kept(best);
-        if kept >= MOST_KEPT || !self.prices.begins(cost(best), scratch) {
+        if kept >= MOST_KEPT || !self.prices.begins(motion, cost(best), scratch) {
             return None;
         }
         Some(Keeping {

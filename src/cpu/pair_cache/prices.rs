@@ -1,23 +1,21 @@
 //! What frames cost by the clock: with kept pairs, and from scratch.
 
 use crate::cpu::mean_time::MeanTime;
+use crate::load::is_same_pace;
 
 /// Frames from scratch before pairs are kept, and the first of them that counts: one builds the tree, the next may
 /// refit it. The least of those that count is taken: an interrupted one would make keeping look cheap for good.
 const FEWEST_FRAMES: u32 = 6;
 const FIRST_COUNTED: u32 = 3;
 
-/// Keeping stops when it has cost this many frames from scratch more than finding as many from scratch. To begin costs
-/// one or two.
+/// Keeping stops when it has cost this many frames from scratch more than finding as many from scratch.
 const MOST_LOST: f32 = 4.0;
 
-/// One frame counts as at most this many from scratch.
-const MOST_OF_FRAME: f32 = 4.0;
+/// The frame that begins to keep pairs counts as at most this many from scratch: it alone pays for memory.
+const MOST_OF_FIRST: f32 = 3.0;
 
-/// A frame that takes so many times the mean was interrupted by the system, unless another one took as long within so
-/// many frames before. It counts as the mean. Counted in full, two within ten frames stopped keeping for 500.
-const INTERRUPTED: f32 = 2.0;
-const APART: u32 = 16;
+/// A frame counts as at most this many times what its work is expected to take: longer ones were interrupted.
+const MOST_RISE: f32 = 2.0;
 
 /// After a failure, keeping must promise to cost this many times less than finding from scratch.
 const WARY: f32 = 1.1;
@@ -32,7 +30,7 @@ const FORGETTING: f32 = 512.0;
 /// of another machine, but it knows how costs change with the scene.
 #[derive(Debug, Clone)]
 pub(super) struct Prices {
-    /// Without a clock, the model alone decides.
+    /// Without a clock, frames take what the model says.
     timed: bool,
     /// By number of threads, and the one in use: a second thread that is slow to wake says nothing of the first.
     widths: Vec<OfWidth>,
@@ -41,10 +39,18 @@ pub(super) struct Prices {
     lost: f32,
     /// What the model said of keeping and of finding from scratch when keeping began.
     promised: [f32; 2],
-    /// Sum and number of the frames since, without the first, which builds.
+    /// Sum and number of what the model said of the work in the frames since, without the first, which builds.
     kept: [f32; 2],
-    /// Frames since one took far longer than the mean one.
-    calm: u32,
+    failure: Failure,
+}
+
+/// What the last failure showed of the promises.
+#[derive(Debug, Clone, Copy)]
+struct Failure {
+    /// The work of keeping over the promised one.
+    over: f32,
+    /// How far boxes moved in a frame after it, in edges, once that is known. Slower boxes are kept more cheaply.
+    pace: Option<f32>,
 }
 
 /// What frames on one number of threads have shown.
@@ -52,23 +58,18 @@ pub(super) struct Prices {
 struct OfWidth {
     /// Number of frames from scratch.
     frames: u32,
-    /// Of the mean frame from scratch.
+    /// Of the mean frame from scratch, and of the mean frame with kept pairs over that.
     scratch: MeanTime,
-    /// Measured cost of keeping over the promised one when it last failed.
-    over: f32,
-}
-
-impl OfWidth {
-    fn failed_by(over: f32) -> Self {
-        Self { frames: 0, scratch: MeanTime::default(), over }
-    }
+    keeping: MeanTime,
 }
 
 impl Prices {
     /// For this many numbers of threads, of which the first is in use.
     pub(super) fn new(timed: bool, widths: usize) -> Self {
-        let widths = vec![OfWidth::failed_by(1.0); widths];
-        Self { timed, widths, width: 0, lost: 0.0, promised: [0.0; 2], kept: [0.0; 2], calm: APART }
+        let unknown = OfWidth { frames: 0, scratch: MeanTime::default(), keeping: MeanTime::of(1.0) };
+        let failure = Failure { over: 1.0, pace: None };
+        let (widths, promised, kept) = (vec![unknown; widths], [0.0; 2], [0.0; 2]);
+        Self { timed, widths, width: 0, lost: 0.0, promised, kept, failure }
     }
 
     /// Goes on with another number of threads.
@@ -82,12 +83,12 @@ impl Prices {
 
     /// Forgets what a box costs, and not how keeping and finding from scratch compare.
     pub(super) fn forget(&mut self) {
-        self.widths.iter_mut().for_each(|w| *w = OfWidth::failed_by(w.over));
-        (self.lost, self.promised, self.kept) = (0.0, [0.0; 2], [0.0; 2]);
+        self.widths.iter_mut().for_each(|w| (w.frames, w.scratch) = (0, MeanTime::default()));
     }
 
     /// Learns from a frame from scratch, of which the model says `model`.
     pub(super) fn add_scratch(&mut self, took: f32, model: f32) {
+        let took = if self.timed { took } else { model };
         let of = self.now();
         of.frames = of.frames.saturating_add(1);
         let cost = f64::from(took / model);
@@ -98,23 +99,28 @@ impl Prices {
         }
     }
 
-    /// Begins a try of keeping if it is worth one by what the model says, and returns whether. The clock ends a try
-    /// that does not pay, whose measured cost counts, less and less, for the next ones.
-    pub(super) fn begins(&mut self, keeping: f32, scratch: f32) -> bool {
-        let OfWidth { over, frames, .. } = *self.now();
-        let begins = over * keeping < scratch && (!self.timed || frames >= FEWEST_FRAMES);
+    /// Begins a try of keeping boxes of this pace if it is worth one by what the model says, and returns whether. The
+    /// clock ends a try that does not pay, which counts, less and less, for the next ones.
+    pub(super) fn begins(&mut self, pace: f32, keeping: f32, scratch: f32) -> bool {
+        let failed_at = f64::from(*self.failure.pace.get_or_insert(pace));
+        let is_slower = f64::from(pace) < failed_at && !is_same_pace(pace.into(), failed_at);
+        let over = if is_slower { self.failure.over.min(WARY) } else { self.failure.over };
+        let OfWidth { frames, keeping: measured, .. } = *self.now();
+        let measured = measured.get().unwrap_or(1.0) as f32;
+        let begins = over * measured * keeping < scratch && (!self.timed || frames >= FEWEST_FRAMES);
         if begins {
             // The frame that builds is not counted.
             (self.lost, self.promised, self.kept) = (0.0, [keeping, scratch], [0.0, -1.0]);
-            self.calm = APART;
         }
         begins
     }
 
     /// Frames go by in which no pairs are kept.
     pub(super) fn fade(&mut self, frames: u64) {
-        let kept = (-(frames as f32) / FORGETTING).exp();
-        self.widths.iter_mut().for_each(|w| w.over = 1.0 + (w.over - 1.0) * kept);
+        let kept = (-(frames as f64) / f64::from(FORGETTING)).exp();
+        let faded = |over: f64| 1.0 + (over - 1.0) * kept;
+        self.failure.over = faded(self.failure.over.into()) as f32;
+        self.widths.iter_mut().for_each(|w| w.keeping = MeanTime::of(w.keeping.get().map_or(1.0, faded)));
     }
 
     /// On the threads in use, or on others if no frame from scratch has run on these.
@@ -123,40 +129,32 @@ impl Prices {
         known.next().unwrap_or(1.0) as f32
     }
 
-    /// Ends a try that did not pay, or that had too many pairs to keep. `model`: what the model says of keeping.
-    pub(super) fn failed(&mut self, model: f32, too_many: bool) {
-        let cost = match self.kept {
-            _ if too_many => CROWDED * self.promised[1],
-            [sum, frames] if frames > 0.0 => sum / frames / self.of_scratch(),
-            _ => model,
+    /// Ends a try that did not pay, or that had too many pairs to keep, at any pace.
+    pub(super) fn failed(&mut self, too_many: bool) {
+        let (work, pace) = match self.kept {
+            _ if too_many => (CROWDED * self.promised[1], Some(0.0)),
+            [sum, frames] if frames > 0.0 => (sum / frames, None),
+            _ => (self.promised[0], None),
         };
-        self.now().over = (WARY * cost / self.promised[0]).max(1.0);
+        self.failure = Failure { over: (WARY * work / self.promised[0]).max(WARY), pace };
     }
 
-    /// Learns from a frame with kept pairs, in which all may have been made again. `keeping` and `scratch`: what the
-    /// model says. Returns whether to go on.
-    pub(super) fn pays(&mut self, took: f32, keeping: f32, scratch: f32, rebuilt: bool) -> bool {
-        if !self.timed {
-            return keeping < scratch;
-        }
-        let scratch = scratch * self.of_scratch();
-        let mut took = took.min(MOST_OF_FRAME * scratch);
+    /// Learns from a frame with kept pairs. `work`, `scratch`: what the model says of it, and of one from scratch.
+    /// Returns whether to go on.
+    pub(super) fn pays(&mut self, took: f32, work: f32, scratch: f32) -> bool {
+        let of_scratch = self.of_scratch();
+        let (expected, scratch) = (work * of_scratch, scratch * of_scratch);
+        let took = if self.timed { took } else { expected };
+        let mut most = MOST_OF_FIRST * scratch;
         self.kept[1] += 1.0;
         if self.kept[1] > 0.0 {
-            let mean = match self.kept {
-                [sum, frames] if frames > 1.0 => sum / (frames - 1.0),
-                _ => self.promised[0] / self.promised[1] * scratch,
-            };
-            let stands_out = !rebuilt && took > INTERRUPTED * mean;
-            if stands_out && self.calm >= APART {
-                took = mean;
-            }
-            self.calm = if stands_out { 0 } else { self.calm + 1 };
-            self.kept[0] += took;
+            self.kept[0] += work;
+            let measured = &mut self.now().keeping;
+            most = MOST_RISE * expected * measured.get().unwrap_or(1.0) as f32;
+            measured.add(f64::from(took / expected));
         }
-        let over = took / scratch - 1.0;
         // NaN, of 0 over 0, counts as 0.
-        self.lost = (self.lost + over).max(0.0);
+        self.lost = (self.lost + took.min(most) / scratch - 1.0).max(0.0);
         self.lost <= MOST_LOST
     }
 }
@@ -165,89 +163,102 @@ impl Prices {
 mod tests {
     use super::*;
 
+    /// After frames from scratch that took 50 ns a box, of which the model says 40, and the beginning of a try that
+    /// promises to take 30 instead. Boxes move by a tenth of an edge.
+    fn keeping(widths: usize, width: usize) -> Prices {
+        let mut prices = Prices::new(true, widths);
+        prices.set_width(width);
+        (0..10).for_each(|_| prices.add_scratch(50.0, 40.0));
+        assert!(prices.begins(0.1, 30.0, 40.0) && prices.pays(200.0, 90.0, 40.0));
+        prices
+    }
+
     #[test]
     fn keeping_is_tried_after_six_frames_and_stops_when_it_has_lost_four() {
         let mut prices = Prices::new(true, 1);
         for frame in 0..6 {
-            assert!(!prices.begins(10.0, 40.0));
+            assert!(!prices.begins(0.1, 10.0, 40.0));
             // The tree is built, and one frame is interrupted.
             prices.add_scratch(if frame < 2 || frame == 4 { 500.0 } else { 50.0 }, 40.0);
         }
-        assert!(!prices.begins(41.0, 40.0) && prices.begins(39.0, 40.0));
+        assert!(!prices.begins(0.1, 41.0, 40.0) && prices.begins(0.1, 39.0, 40.0));
         // The first frame builds. Then half a frame is saved in each.
-        assert!(prices.pays(150.0, 10.0, 40.0, false));
-        assert!((0..1000).all(|k| prices.pays(if k % 50 == 0 { 150.0 } else { 25.0 }, 10.0, 40.0, false)));
-        // An interruption is no reason to stop, a tenth more in each frame is.
-        assert!(prices.pays(5000.0, 10.0, 40.0, false));
-        assert!((0..20).all(|_| prices.pays(25.0, 10.0, 40.0, false)));
-        let frames = (0..1000).take_while(|_| prices.pays(55.0, 10.0, 40.0, false)).count();
+        assert!(prices.pays(1500.0, 90.0, 40.0));
+        assert!((0..1000).all(|k| prices.pays(if k % 50 == 0 { 150.0 } else { 25.0 }, 10.0, 40.0)));
+        // A tenth more in each frame is a reason to stop.
+        let frames = (0..1000).take_while(|_| prices.pays(55.0, 10.0, 40.0)).count();
         assert!((30..50).contains(&frames), "{frames}");
         // In a denser scene both cost more.
-        assert!(prices.begins(60.0, 80.0));
-        assert!((0..1000).all(|_| prices.pays(90.0, 60.0, 80.0, false)));
+        assert!(prices.begins(0.01, 15.0, 80.0));
+        assert!((0..1000).all(|_| prices.pays(90.0, 15.0, 80.0)));
     }
 
     #[test]
-    fn interruptions_apart_are_no_reason_to_stop_and_frames_that_often_take_long_are() {
-        let frames = |every: u32| {
-            let mut prices = Prices::new(true, 1);
-            (0..10).for_each(|_| prices.add_scratch(50.0, 40.0));
-            assert!(prices.begins(30.0, 40.0) && prices.pays(200.0, 30.0, 40.0, false));
-            (0..1000).take_while(|k| prices.pays(if k % every == 0 { 5000.0 } else { 40.0 }, 30.0, 40.0, false)).count()
+    fn interruptions_are_no_reason_to_stop_and_frames_that_have_much_to_do_are() {
+        let frames = |every: u32, work: f32| {
+            let mut prices = keeping(1, 0);
+            let pays = |k: &u32| {
+                let (took, work) = if k % every == 0 { (5000.0, work) } else { (40.0, 30.0) };
+                prices.pays(took, work, 40.0)
+            };
+            (0..1000).take_while(pays).count()
         };
-        assert_eq!([frames(1000), frames(20)], [1000; 2]);
-        assert!(frames(10) < 50 && frames(2) < 10);
-        // What takes long by itself counts each time.
-        let mut prices = Prices::new(true, 1);
-        (0..10).for_each(|_| prices.add_scratch(50.0, 40.0));
-        assert!(prices.begins(30.0, 40.0) && prices.pays(200.0, 30.0, 40.0, true));
-        let pays = |k: &u32| {
-            let rebuilt = k.is_multiple_of(20);
-            prices.pays(if rebuilt { 5000.0 } else { 45.0 }, 30.0, 40.0, rebuilt)
-        };
-        assert!((0..1000).take_while(pays).count() < 100);
+        assert_eq!([1000, 20, 10].map(|every| frames(every, 30.0)), [1000; 3]);
+        assert!(frames(2, 30.0) < 20);
+        assert!(frames(1000, 4000.0) < 10 && frames(20, 1000.0) < 100);
+    }
+
+    /// The first promise, of those that fall by one, for which keeping would begin.
+    fn begins_at(prices: &Prices, pace: f32) -> i32 {
+        (0..40).rev().find(|&keeping| prices.clone().begins(pace, keeping as f32, 40.0)).unwrap()
     }
 
     #[test]
-    fn a_failure_counts_for_the_next_promises() {
-        let mut prices = Prices::new(true, 1);
-        (0..10).for_each(|_| prices.add_scratch(50.0, 40.0));
-        assert!(prices.begins(30.0, 40.0));
-        while prices.pays(60.0, 30.0, 40.0, false) {}
-        prices.failed(30.0, false);
-        // Kept pairs cost 48 of these where 30 were promised.
-        assert!(!prices.begins(30.0, 40.0) && !prices.begins(23.0, 40.0) && prices.clone().begins(22.0, 40.0));
+    fn slow_frames_count_for_the_next_promises() {
+        let mut prices = keeping(1, 0);
+        while prices.pays(52.0, 30.0, 40.0) {}
+        prices.failed(false);
+        // Frames took 1.39 times what their work promised.
+        assert_eq!([0.1, 0.01].map(|pace| begins_at(&prices, pace)), [26; 2]);
         let waits = |_: &u32| {
             prices.fade(1);
-            !prices.begins(30.0, 40.0)
+            !prices.begins(0.1, 30.0, 40.0)
         };
         let frames = (0..10_000).take_while(waits).count();
-        assert!((300..700).contains(&frames), "{frames}");
-        prices.failed(30.0, true);
-        assert!(!prices.begins(19.0, 40.0));
-        prices.fade(10_000);
-        assert!(prices.begins(39.0, 40.0));
+        assert!((150..500).contains(&frames), "{frames}");
     }
 
     #[test]
-    fn a_failure_on_two_threads_does_not_count_on_one() {
-        let mut prices = Prices::new(true, 2);
-        prices.set_width(1);
-        (0..10).for_each(|_| prices.add_scratch(50.0, 40.0));
-        assert!(prices.begins(30.0, 40.0));
-        while prices.pays(90.0, 30.0, 40.0, false) {}
-        prices.failed(30.0, false);
-        assert!(!prices.begins(30.0, 40.0));
+    fn more_work_than_promised_counts_unless_boxes_move_more_slowly() {
+        let mut prices = keeping(1, 0);
+        while prices.pays(75.0, 60.0, 40.0) {}
+        prices.failed(false);
+        // Kept pairs were twice the promised work, at this pace.
+        assert!(!prices.begins(0.1, 30.0, 40.0));
+        assert_eq!([0.1, 0.2, 0.09, 0.01].map(|pace| begins_at(&prices, pace)), [18, 18, 18, 36]);
+        prices.failed(true);
+        assert_eq!([0.1, 0.01].map(|pace| begins_at(&prices, pace)), [13; 2]);
+        prices.fade(10_000);
+        assert_eq!(begins_at(&prices, 0.1), 39);
+    }
+
+    #[test]
+    fn slow_frames_on_two_threads_do_not_count_on_one() {
+        let mut prices = keeping(2, 1);
+        while prices.pays(90.0, 30.0, 40.0) {}
+        prices.failed(false);
+        assert!(begins_at(&prices, 0.1) < 25);
         prices.set_width(0);
-        assert!(!prices.begins(30.0, 40.0), "no frame from scratch has run on one thread");
+        assert!(!prices.begins(0.1, 10.0, 40.0), "no frame from scratch has run on one thread");
         (0..6).for_each(|_| prices.add_scratch(50.0, 40.0));
-        assert!(prices.begins(30.0, 40.0));
+        assert_eq!(begins_at(&prices, 0.1), 36);
     }
 
     #[test]
     fn without_a_clock_the_model_decides() {
         let mut prices = Prices::new(false, 1);
-        assert!(prices.begins(39.0, 40.0) && !prices.begins(41.0, 40.0));
-        assert!(prices.pays(1.0e9, 39.0, 40.0, false) && !prices.pays(0.0, 41.0, 40.0, false));
+        assert!(prices.begins(0.1, 39.0, 40.0) && !prices.begins(0.1, 41.0, 40.0));
+        assert!((0..100).all(|_| prices.pays(1.0e9, 39.0, 40.0)));
+        assert!(!(0..100).all(|_| prices.pays(0.0, 43.0, 40.0)));
     }
 }

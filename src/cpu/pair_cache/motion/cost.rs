@@ -6,11 +6,13 @@ pub(super) const BOX: f32 = 1.5;
 /// A kept pair tested.
 const KEPT: f32 = 2.5;
 /// A box looked at again in a frame in which some box left.
-pub(super) const AGAIN: f32 = 1.0;
+pub(super) const AGAIN: f32 = 3.0;
 /// A box that left, and each node of the tree that is looked at for it, while the tree is in the cache.
-const LEFT: [f32; 2] = [60.0, 10.0];
-/// A box and a pair found by a tree from scratch.
-const SCRATCH: [f32; 2] = [40.0, 7.0];
+const LEFT: [f32; 2] = [60.0, 15.0];
+/// A box and a pair found by a tree that is refitted.
+const SCRATCH: [f32; 2] = [16.0, 4.5];
+/// A box and a kept pair when all are grown again.
+const REBUILD: [f32; 2] = [60.0, 10.5];
 
 /// A box sorted and put into a leaf.
 const SORT: f32 = 25.0;
@@ -20,10 +22,9 @@ pub(super) fn scratch(far: f32, density: f32) -> f32 {
     far.sqrt() * (SCRATCH[0] + SCRATCH[1] * density)
 }
 
-/// The cost of a box where all are grown again and so many pairs of each are kept: those of a tree from scratch, of
-/// larger boxes.
+/// The cost of a box when all are grown again and this many pairs of each are kept.
 pub(super) fn rebuild(far: f32, kept: f32) -> f32 {
-    1.5 * scratch(far, kept)
+    far.sqrt() * (REBUILD[0] + REBUILD[1] * kept)
 }
 
 /// The cost of a box where all are sorted anew.
