@@ -5,7 +5,8 @@ mod bounds;
 #[cfg(any(feature = "glam-034", feature = "mint"))]
 mod conversions;
 
-use crate::error::{BoxDefect, Error};
+use crate::Error;
+use crate::error::BoxDefect;
 
 /// An axis-aligned bounding box, closed on every side: boxes that touch overlap.
 ///

@@ -1,9 +1,7 @@
 //! The interface of every algorithm.
 
-use crate::aabb::Aabb;
-use crate::error::Error;
 use crate::load::FramePlan;
-use crate::pairs::Pairs;
+use crate::{Aabb, Error, Pairs};
 
 /// Finds all pairs of overlapping boxes.
 ///

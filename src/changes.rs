@@ -1,8 +1,8 @@
 //! The pairs that began and ended between two frames.
 
 use crate::cpu::{self, Workers};
-use crate::error::Error;
-use crate::pairs::{Pairs, Sorter};
+use crate::pairs::Sorter;
+use crate::{Error, Pairs};
 
 /// Follows pairs from frame to frame by the caller's ids: the pairs that began, those that ended, and all of them.
 ///

@@ -1,6 +1,6 @@
 //! An algorithm in a registry.
 
-use crate::algorithm::AlgorithmId;
+use crate::AlgorithmId;
 use crate::error::Unavailable;
 
 /// An algorithm in a registry.

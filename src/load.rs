@@ -6,7 +6,7 @@ mod sampled_boxes;
 mod scene_stats;
 mod strip_grid;
 
-use crate::aabb::Aabb;
+use crate::Aabb;
 use crate::splitmix::mix;
 
 pub(crate) use displacement::is_same_pace;

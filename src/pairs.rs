@@ -4,10 +4,10 @@ mod fill;
 mod order;
 
 use crate::cpu::Workers;
-use crate::error::Error;
-use crate::filter::{Filter, Screen};
+use crate::filter::Screen;
 use crate::pair::Pair;
 use crate::splitmix::mix;
+use crate::{Error, Filter};
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Weak};
 

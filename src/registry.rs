@@ -1,10 +1,10 @@
 //! The algorithms that this machine can run.
 
-use crate::algorithm::{AlgorithmId, Backend, BackendClass, MOST_THREADS, ParseIdError};
-use crate::broad_phase::BroadPhase;
+use crate::algorithm::{Backend, BackendClass, MOST_THREADS, ParseIdError};
 use crate::cpu::{self, Made, Method, Simd, SimdLevel, Threads, Workers};
 use crate::entry::Entry;
-use crate::error::{Error, Unavailable};
+use crate::error::Unavailable;
+use crate::{AlgorithmId, BroadPhase, Error};
 use std::any::{Any, TypeId};
 use std::fmt;
 use std::sync::Arc;

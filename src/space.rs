@@ -19,13 +19,9 @@ mod tests;
 mod update;
 mod view;
 
-use crate::aabb::Aabb;
-use crate::adaptive::Adaptive;
 use crate::cpu::Tree;
-use crate::error::Error;
 use crate::pairs::Sorter;
-use crate::registry::Registry;
-use crate::tuning::Tuning;
+use crate::{Aabb, Adaptive, Error, Registry, Tuning};
 use active::Active;
 use links::Links;
 use near::Neighbours;

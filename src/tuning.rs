@@ -7,10 +7,9 @@ mod file;
 mod slice;
 pub(crate) mod tangents;
 
-use crate::algorithm::{AlgorithmId, BackendClass, Load};
+use crate::algorithm::{BackendClass, Load};
 use crate::cost::Residual;
-use crate::named;
-use crate::registry::Registry;
+use crate::{AlgorithmId, Registry, named};
 use slice::Slice;
 use std::sync::Arc;
 

@@ -1,12 +1,9 @@
 //! Many small worlds, searched in one call.
 
-use crate::aabb::Aabb;
 use crate::broad_phase::check_count;
 use crate::cpu::{Outputs, Simd, Workers, WorldSearch, part, reserve, split};
-use crate::error::Error;
 use crate::pair::Pair;
-use crate::pairs::Pairs;
-use crate::registry::Registry;
+use crate::{Aabb, Error, Pairs, Registry};
 
 /// Boxes that are searched in the time that `grid-sap` takes for one, in round numbers.
 const BOXES_PER_BOX: usize = 4;

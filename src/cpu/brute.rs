@@ -1,16 +1,9 @@
 //! Tests each of the n (n - 1) / 2 pairs on three axes, as in the paper.
 
-use crate::aabb::Aabb;
-use crate::broad_phase::{BroadPhase, check_count};
-use crate::cpu::Threads;
-use crate::cpu::columns::{Columns, ensure};
-use crate::cpu::kernel::rows::brute_rows;
-use crate::cpu::level::Simd;
-use crate::cpu::outputs::Outputs;
-use crate::cpu::workers::Workers;
-use crate::error::Error;
+use crate::broad_phase::check_count;
+use crate::cpu::{Columns, Outputs, Simd, Threads, Workers, brute_rows, ensure};
 use crate::filter::Screen;
-use crate::pairs::Pairs;
+use crate::{Aabb, BroadPhase, Error, Pairs};
 
 /// Pairs that are tested in the time that `grid-sap` takes for a box, in round numbers.
 const PAIRS_PER_BOX: usize = 512;

@@ -3,16 +3,10 @@
 //! The cost of a frame follows the numbers of boxes and pairs, wherever the boxes lie and whatever their sizes: see
 //! [`tree`](super::tree).
 
-use crate::aabb::Aabb;
-use crate::broad_phase::{BroadPhase, check_count};
-use crate::cpu::Threads;
-use crate::cpu::level::Simd;
-use crate::cpu::outputs::Outputs;
-use crate::cpu::tree::{Tree, Upkeep};
-use crate::cpu::workers::Workers;
-use crate::error::Error;
+use crate::broad_phase::check_count;
+use crate::cpu::{Outputs, Simd, Threads, Tree, Upkeep, Workers};
 use crate::load::FramePlan;
-use crate::pairs::Pairs;
+use crate::{Aabb, BroadPhase, Error, Pairs};
 
 /// The method; see the module.
 #[derive(Debug)]

@@ -1,7 +1,6 @@
 //! Boxes as columns, so that one vector instruction tests several of them.
 
-use crate::aabb::Aabb;
-use crate::error::Error;
+use crate::{Aabb, Error};
 use std::ops::Range;
 
 /// Readable values behind the last box: the widest vector may start at any box and run past the end.

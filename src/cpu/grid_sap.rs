@@ -17,20 +17,13 @@
 //! Oversized boxes, the boxes of overfull strips and [passive](Screen) boxes go into a separate [tree](super::tree).
 //! Its boxes are compared with each other, but for two passive ones, and with the boxes of every strip.
 
-use crate::aabb::Aabb;
-use crate::broad_phase::{BroadPhase, check_count};
-use crate::cpu::Threads;
-use crate::cpu::columns::{Columns, ensure, order_key, part, reserve};
-use crate::cpu::kernel::node::{Group, LANES};
-use crate::cpu::kernel::rows::sweep_rows;
-use crate::cpu::level::Simd;
-use crate::cpu::outputs::Outputs;
-use crate::cpu::tree::{Members, Tree};
-use crate::cpu::workers::Workers;
-use crate::error::Error;
+use crate::broad_phase::check_count;
+use crate::cpu::{
+    Columns, Group, LANES, Members, Outputs, Simd, Threads, Tree, Workers, ensure, order_key, part, reserve, sweep_rows,
+};
 use crate::filter::Screen;
 use crate::load::{FramePlan, SceneStats, StripGrid, StripSpan};
-use crate::pairs::Pairs;
+use crate::{Aabb, BroadPhase, Error, Pairs};
 use std::ops::Range;
 
 /// Most boxes of a strip. The boxes of a fuller one go into the tree. This is sixteen times the number in a strip of

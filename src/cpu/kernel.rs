@@ -18,13 +18,15 @@ pub(crate) mod walk;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-use crate::aabb::Aabb;
+use crate::Aabb;
 use crate::pair::Pair;
 use crate::pairs::each_bit;
 use baseline::Four;
 use contain::{BLOCK, within};
 use floats::Floats;
-use node::LANES;
+use marks::{Marks, Wanted};
+use nearest_first::Measure;
+use node::{Group, LANES, Node};
 use rows::View;
 
 /// A SIMD level for which code is compiled. A value proves that this CPU has its instructions.

@@ -22,23 +22,27 @@ mod tree;
 mod workers;
 mod world;
 
-pub(crate) use columns::{Columns, ensure, part, reserve, split};
 #[cfg(feature = "parallel")]
 pub use helpers::pinned_pool;
-pub(crate) use kernel::node::{Group, LANES};
-pub(crate) use kernel::rows::brute_rows;
-pub(crate) use level::Simd;
 pub use level::{SimdLevel, SimdLevelError};
-pub(crate) use outputs::Outputs;
-pub(crate) use pair_cache::GrownTree;
 pub use threads::Threads;
 pub use tree::Tree;
-pub(crate) use tree::{Members, Near, Wear};
 pub use workers::Workers;
+
+pub(crate) use columns::{Columns, ColumnsMut, ensure, order_key, part, reserve, split};
+pub(crate) use kernel::marks::Marks;
+pub(crate) use kernel::node::{Group, LANES, Node};
+pub(crate) use kernel::prefetch;
+pub(crate) use kernel::rows::{brute_rows, sweep_rows};
+pub(crate) use kernel::walk::Walk;
+pub(crate) use level::Simd;
+pub(crate) use outputs::Outputs;
+pub(crate) use pair_cache::GrownTree;
+pub(crate) use sort::sort;
+pub(crate) use tree::{Members, NOBODY, Near, Upkeep, Wear};
 pub(crate) use world::WorldSearch;
 
-use crate::broad_phase::BroadPhase;
-use crate::error::Error;
+use crate::{BroadPhase, Error};
 
 /// A built-in method: a row here puts it into every registry, contract, probe and sweep.
 pub(crate) struct Method {

@@ -1,9 +1,7 @@
 //! The pairs that the tasks of a frame find.
 
-use crate::cpu::columns::split;
-use crate::cpu::workers::Workers;
-use crate::error::Error;
-use crate::pairs::Pairs;
+use crate::cpu::{Workers, split};
+use crate::{Error, Pairs};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 

@@ -2,18 +2,10 @@
 //!
 //! The paper sweeps along the axis of greatest variance, which a few boxes far away decide.
 
-use crate::aabb::Aabb;
-use crate::broad_phase::{BroadPhase, check_count};
-use crate::cpu::Threads;
-use crate::cpu::columns::{Columns, ensure, order_key, part};
-use crate::cpu::kernel::rows::sweep_rows;
-use crate::cpu::level::Simd;
-use crate::cpu::outputs::Outputs;
-use crate::cpu::sort::sort;
-use crate::cpu::workers::Workers;
-use crate::error::Error;
+use crate::broad_phase::check_count;
+use crate::cpu::{Columns, Outputs, Simd, Threads, Workers, ensure, order_key, part, sort, sweep_rows};
 use crate::load::FramePlan;
-use crate::pairs::Pairs;
+use crate::{Aabb, BroadPhase, Error, Pairs};
 
 /// The method; see the module.
 #[derive(Debug)]

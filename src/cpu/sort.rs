@@ -1,8 +1,7 @@
 //! Sorts keys on all threads: each part by a radix sort, then merges the parts two by two.
 
-use crate::cpu::columns::ensure;
-use crate::cpu::workers::Workers;
-use crate::error::Error;
+use crate::Error;
+use crate::cpu::{Workers, ensure};
 
 /// Fewest keys of a merging task: a smaller task costs more than it saves.
 const SMALLEST_MERGE: usize = 4096;

@@ -1,13 +1,11 @@
 //! Spreads a frame over threads: phases of independent tasks, each with its own memory.
 
-use crate::aabb::Aabb;
 #[cfg(feature = "parallel")]
 use crate::algorithm::AlgorithmId;
-use crate::cpu::Threads;
-use crate::cpu::columns::{Columns, ColumnsMut};
 #[cfg(feature = "parallel")]
 use crate::cpu::helpers::Helpers;
-use crate::error::Error;
+use crate::cpu::{Columns, ColumnsMut, Threads};
+use crate::{Aabb, Error};
 #[cfg(feature = "parallel")]
 use std::sync::Arc;
 use std::sync::{Mutex, PoisonError};
@@ -199,9 +197,8 @@ impl Workers {
 #[cfg(all(test, feature = "parallel"))]
 mod tests {
     use super::*;
-    use crate::cpu::METHODS;
-    use crate::cpu::level::{Simd, SimdLevel};
-    use crate::pairs::Pairs;
+    use crate::Pairs;
+    use crate::cpu::{METHODS, Simd, SimdLevel};
     use crate::splitmix::mix;
     use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
     use std::sync::mpsc;

@@ -1,15 +1,9 @@
 //! Finds the pairs of one of many worlds, on one thread: small ones without a sort, large ones with a tree.
 
-use crate::aabb::Aabb;
-use crate::cpu::columns::{Columns, ensure, order_key};
-use crate::cpu::kernel::rows::sweep_rows;
 use crate::cpu::kernel::small::{MOST_ROWS, small_world};
-use crate::cpu::level::Simd;
-use crate::cpu::tree::{Members, Tree};
-use crate::cpu::workers::Workers;
-use crate::error::Error;
+use crate::cpu::{Columns, Members, Simd, Tree, Workers, ensure, order_key, sweep_rows};
 use crate::load::SceneStats;
-use crate::pairs::Pairs;
+use crate::{Aabb, Error, Pairs};
 use std::ops::Range;
 
 /// The most boxes of a world that is swept along x. Even if all overlap on x, a sweep takes about as long as a tree.

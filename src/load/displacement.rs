@@ -1,7 +1,7 @@
 //! Measures how far boxes move from one frame to the next.
 
 use super::one_of_each;
-use crate::aabb::Aabb;
+use crate::Aabb;
 
 /// Boxes watched. The standard error of their mean displacement is an eighth of the standard deviation over all boxes.
 const WATCHED: usize = 64;

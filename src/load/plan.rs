@@ -3,7 +3,7 @@
 use super::sampled_boxes::SampledBoxes;
 use super::scene_stats::SceneStats;
 use super::strip_grid::StripGrid;
-use crate::aabb::Aabb;
+use crate::Aabb;
 
 /// What the choice of an algorithm has worked out about a frame, for the algorithm that runs it:
 /// [`BroadPhase::find_pairs_with`](crate::BroadPhase::find_pairs_with).

@@ -1,7 +1,7 @@
 //! Statistics of a frame, from a few hundred of its boxes.
 
 use super::sampled_boxes::{MOST, SampledBoxes};
-use crate::aabb::Aabb;
+use crate::Aabb;
 use std::cmp::Ordering;
 
 /// Divisor for the share of the sample at either end that says nothing about where boxes lie: boxes pooled far away, or

@@ -1,7 +1,7 @@
 //! The grid of strips: cells over the two axes across the sweep.
 
 use super::scene_stats::SceneStats;
-use crate::aabb::Aabb;
+use crate::Aabb;
 
 /// Mean number of boxes in a strip. Their columns take 28 bytes each: a strip fits the first-level cache, and there are
 /// enough strips to reduce the candidates.

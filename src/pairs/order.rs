@@ -4,8 +4,8 @@
 //! Within a bucket only the rest of a key counts. It usually has 32 bits, which halves the bytes moved. With several
 //! threads, each first sorts its own share into buckets, and then all shares of a bucket are joined.
 
+use crate::Error;
 use crate::cpu::{Workers, ensure, split};
-use crate::error::Error;
 use crate::pair::Pair;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 

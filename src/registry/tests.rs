@@ -1,6 +1,5 @@
 use super::*;
-use crate::aabb::Aabb;
-use crate::pairs::Pairs;
+use crate::{Aabb, Pairs};
 
 #[test]
 fn thread_counts_double_up_to_all() {

@@ -2,9 +2,7 @@
 
 use super::IDLE;
 use super::body::Body;
-use crate::aabb::Aabb;
-use crate::filter::{Filter, Membership};
-use crate::pairs::Pairs;
+use crate::{Aabb, Filter, Membership, Pairs};
 
 /// How long a body stays active if nobody sets it.
 ///

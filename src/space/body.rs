@@ -1,6 +1,6 @@
 //! What a body may meet.
 
-use crate::filter::Membership;
+use crate::Membership;
 
 /// What a body of a [`Space`](crate::Space) may meet, and a number of the caller's.
 ///

@@ -1,7 +1,7 @@
 //! The resting bodies near each active one that it may meet, kept while it stays within its fat AABB.
 
 use super::resting::Resting;
-use crate::aabb::Aabb;
+use crate::Aabb;
 
 /// Margin of a fat AABB, in mean edges of the body.
 const MARGIN: f32 = 0.25;

@@ -1,10 +1,9 @@
 //! The bodies that were not set for some updates: a tree of them, and the pairs among them.
 
 use super::slots::Slots;
-use crate::aabb::Aabb;
 use crate::cpu::{GrownTree, Members, Simd, SimdLevel, Tree, Wear, Workers};
-use crate::error::Error;
 use crate::load::SceneStats;
+use crate::{Aabb, Error};
 
 /// What it costs to sort a box into a tree, in nodes looked at by queries: 25 and 5 ns on the Zen 3 host of
 /// `datasets/`.

@@ -2,9 +2,8 @@
 
 use super::body::Body;
 use super::handle::Handle;
-use crate::aabb::Aabb;
 use crate::cpu::reserve;
-use crate::error::Error;
+use crate::{Aabb, Error};
 
 /// Where a body is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

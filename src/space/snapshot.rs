@@ -6,7 +6,7 @@ use super::handle::Handle;
 use super::slots::At;
 use super::update::{handles, key, slots};
 use super::{IDLE, Space};
-use crate::aabb::Aabb;
+use crate::Aabb;
 use serde::de::{Deserialize, Deserializer, Error};
 use serde::ser::{Serialize, Serializer};
 

@@ -1,12 +1,11 @@
 //! The steps of an update.
 
 use super::{FEWEST, Handle, IDLE, MANY, Space};
-use crate::broad_phase::BroadPhase;
 use crate::changes::differences;
 use crate::cpu::Workers;
-use crate::error::Error;
 use crate::space::active::Patience;
 use crate::space::slots::{At, REMOVED, SET_BODY, Slots};
+use crate::{BroadPhase, Error};
 
 /// Makes the key of a pair of slots, the lower one in the upper half.
 pub(super) fn key(a: u32, b: u32) -> u64 {

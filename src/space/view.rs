@@ -2,11 +2,8 @@
 
 use super::handle::Handle;
 use super::{Body, Space};
-use crate::aabb::Aabb;
 use crate::cpu::{Near, Tree};
-use crate::error::Error;
-use crate::filter::Membership;
-use crate::ray::Ray;
+use crate::{Aabb, Error, Membership, Ray};
 
 /// The bodies of a [`Space`] that one body may meet, for queries.
 ///

@@ -5,8 +5,7 @@
 use super::{AlgorithmCost, Crossover, Source, Step, Tuning, TuningError};
 use crate::AlgorithmId;
 use crate::algorithm::Load;
-use crate::cost::Work;
-use crate::cost::{CostTerm, Fallback, Helpers, Places, Residual};
+use crate::cost::{CostTerm, Fallback, Helpers, Places, Residual, Work};
 use crate::tuning::CostCurve;
 use std::sync::Arc;
 

@@ -1,8 +1,7 @@
 //! The bounds of boxes that are added one by one.
 
-use super::floats::Floats;
-use super::{Four, corners};
-use crate::aabb::Aabb;
+use super::{Floats, Four, corners};
+use crate::Aabb;
 
 /// The bounds of the boxes that were added, and whether all of these are valid.
 #[derive(Debug, Clone, Copy)]

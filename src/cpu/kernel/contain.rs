@@ -1,8 +1,8 @@
 //! Tests whether boxes are valid and lie within others: many at a time, at every SIMD level.
 
 use super::{Level, at_level};
-use crate::aabb::Aabb;
-use crate::cpu::level::Simd;
+use crate::Aabb;
+use crate::cpu::Simd;
 
 /// Boxes tested together. Eight have 48 bounds: three vectors of 16, or six of eight.
 pub(crate) const BLOCK: usize = 8;

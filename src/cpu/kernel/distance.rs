@@ -1,9 +1,6 @@
 //! The distances of a point to sixteen boxes.
 
-use super::Level;
-use super::floats::Floats;
-use super::nearest_first::Measure;
-use super::node::{LANES, Node};
+use super::{Floats, LANES, Level, Measure, Node};
 
 /// The Euclidean distance of a box to this point, 0 inside.
 #[derive(Debug, Clone, Copy)]

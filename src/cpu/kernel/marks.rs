@@ -1,9 +1,8 @@
 //! The memberships of what is in the lanes of a node, tested after the bounds.
 
-use super::node::LANES;
-use super::prefetch;
-use crate::cpu::tree::NOBODY;
-use crate::filter::{Filter, Membership};
+use super::{LANES, prefetch};
+use crate::cpu::NOBODY;
+use crate::{Filter, Membership};
 
 /// Boxes to prefetch ahead.
 const AHEAD: usize = LANES;

@@ -1,9 +1,8 @@
 //! Walks through a tree from near to far.
 
-use super::node::{LANES, Node};
 use super::walk::{MOST_LEVELS, Walk};
-use super::{Level, at_level, prefetch};
-use crate::cpu::level::Simd;
+use super::{LANES, Level, Node, at_level, prefetch};
+use crate::cpu::Simd;
 use crate::pairs::each_bit;
 
 /// What near and far mean. A lane that contains another has no larger measure.

@@ -1,9 +1,8 @@
 //! Sixteen boxes as columns, tested together against one box.
 
-use super::Level;
-use super::floats::Floats;
-use crate::aabb::Aabb;
-use crate::cpu::tree::NOBODY;
+use super::{Floats, Level};
+use crate::Aabb;
+use crate::cpu::NOBODY;
 
 /// Boxes in a node.
 pub(crate) const LANES: usize = 16;

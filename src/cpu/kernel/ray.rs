@@ -1,10 +1,7 @@
 //! A moved box against sixteen: the slab test. A ray is a moved box of no extent.
 
-use super::Level;
-use super::floats::Floats;
-use super::nearest_first::Measure;
-use super::node::{LANES, Node};
-use crate::aabb::Aabb;
+use super::{Floats, LANES, Level, Measure, Node};
+use crate::Aabb;
 
 /// A box on its way; see [`Tree::cast_box`](crate::cpu::tree::Tree::cast_box).
 #[derive(Debug, Clone, Copy)]

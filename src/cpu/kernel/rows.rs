@@ -1,10 +1,9 @@
 //! The rows of columns against one another: the sweep, and all pairs.
 
-use super::floats::Floats;
-use super::{Level, at_level};
-use crate::cpu::columns::{Columns, PADDING};
-use crate::cpu::level::Simd;
-use crate::pairs::Pairs;
+use super::{Floats, Level, at_level};
+use crate::Pairs;
+use crate::cpu::columns::PADDING;
+use crate::cpu::{Columns, Simd};
 use std::ops::Range;
 
 /// Tests every row of `rows` against the rows behind it, up to the first that begins beyond its end on the sweep axis,

@@ -1,11 +1,9 @@
 //! All pairs of a few dozen boxes.
 
-use super::floats::Floats;
-use super::rows::{Query, View};
-use super::{Level, at_level};
-use crate::cpu::columns::Columns;
-use crate::cpu::level::Simd;
-use crate::pairs::Pairs;
+use super::rows::Query;
+use super::{Floats, Level, View, at_level};
+use crate::Pairs;
+use crate::cpu::{Columns, Simd};
 
 /// The most rows: a bit each in a word.
 pub(crate) const MOST_ROWS: usize = 64;

@@ -1,12 +1,9 @@
 //! Walks through a tree of nodes: finds the boxes that overlap a box, and the overlapping pairs.
 
-use super::marks::{Marks, Wanted};
-use super::node::{Group, LANES, Node};
-use super::{Baseline, Level, at_level, prefetch};
-use crate::aabb::Aabb;
-use crate::cpu::level::Simd;
-use crate::filter::Membership;
-use crate::pairs::{Pairs, each_bit};
+use super::{Baseline, Group, LANES, Level, Marks, Node, Wanted, at_level, prefetch};
+use crate::cpu::Simd;
+use crate::pairs::each_bit;
+use crate::{Aabb, Membership, Pairs};
 use std::ops::Range;
 
 /// The nodes of a tree, and the box in each lane of its leaves.

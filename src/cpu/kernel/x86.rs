@@ -1,10 +1,7 @@
 //! What AVX2 and AVX-512 do in another way than other levels.
 
-use super::Level;
-use super::contain::BLOCK;
-use super::node::LANES;
-use super::rows::View;
-use crate::aabb::Aabb;
+use super::{BLOCK, LANES, Level, View};
+use crate::Aabb;
 use crate::cpu::level::{Avx2, Avx512};
 use crate::pair::Pair;
 use std::arch::x86_64::*;

@@ -1,10 +1,10 @@
 //! A space-filling curve that knows the shapes of boxes.
 
 use super::codes::{hilbert, spread2, spread3};
-use crate::aabb::Aabb;
+use crate::Aabb;
+use crate::cpu::LANES;
 #[cfg(target_arch = "x86_64")]
 use crate::cpu::kernel::corners;
-use crate::cpu::kernel::node::LANES;
 use crate::load::SceneStats;
 use std::sync::OnceLock;
 

@@ -1,11 +1,9 @@
 //! Boxes that come into a tree and leave it, each by itself.
 
 use super::{NOBODY, Tree, grow};
-use crate::aabb::Aabb;
-use crate::cpu::kernel::marks::Marks;
-use crate::cpu::kernel::node::{LANES, Node};
-use crate::error::Error;
-use crate::filter::{Membership, Screen};
+use crate::cpu::{LANES, Marks, Node};
+use crate::filter::Screen;
+use crate::{Aabb, Error, Membership};
 
 impl Tree {
     /// Adds boxes, which have no bounds yet: to empty lanes near their place on the curve, else to new leaves, whose

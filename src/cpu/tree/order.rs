@@ -2,13 +2,9 @@
 
 use super::Members;
 use super::curve::{Curve, Spread};
-use crate::aabb::Aabb;
-use crate::cpu::columns::{ensure, order_key};
-use crate::cpu::kernel::node::LANES;
-use crate::cpu::sort::sort;
-use crate::cpu::workers::Workers;
-use crate::error::Error;
+use crate::cpu::{LANES, Workers, ensure, order_key, sort};
 use crate::filter::Screen;
+use crate::{Aabb, Error};
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 

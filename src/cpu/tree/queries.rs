@@ -3,10 +3,9 @@
 //! Any number of threads may query a tree at once. A box of the tree is found once.
 
 use super::Tree;
-use crate::aabb::Aabb;
 use crate::cpu::kernel::distance::Distance;
 use crate::cpu::kernel::ray::Cast;
-use crate::filter::Membership;
+use crate::{Aabb, Membership};
 use std::collections::BinaryHeap;
 
 /// A box near a point. The nearest is the least; of two at the same distance it is the one with the lower id.

@@ -2,12 +2,10 @@
 
 use super::curve::Curve;
 use super::{Members, Tree};
-use crate::aabb::Aabb;
-use crate::cpu::columns::part;
-use crate::cpu::workers::Workers;
-use crate::error::Error;
+use crate::cpu::{Workers, part};
 use crate::filter::Screen;
 use crate::load::SceneStats;
+use crate::{Aabb, Error};
 
 /// Steps of a renewal in which codes are made, each for one part of the boxes.
 const RENEWAL_PARTS: usize = 4;

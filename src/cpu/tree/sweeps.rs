@@ -6,14 +6,9 @@
 
 use super::order::Order;
 use super::{Tree, lay_out};
-use crate::aabb::Aabb;
-use crate::cpu::columns::part;
-use crate::cpu::kernel::node::LANES;
-use crate::cpu::kernel::walk::{Apart, SAMPLE, Walk};
-use crate::cpu::level::Simd;
-use crate::cpu::workers::Workers;
-use crate::error::Error;
-use crate::pairs::Pairs;
+use crate::cpu::kernel::walk::{Apart, SAMPLE};
+use crate::cpu::{LANES, Simd, Walk, Workers, part};
+use crate::{Aabb, Error, Pairs};
 use std::ops::Range;
 
 /// What a copy of a leaf costs, and two copies that meet, in [tests of the tree](Walk::tests).
@@ -166,8 +161,7 @@ fn begun_within(a: &Walk<'_>, b: &Walk<'_>, axis: usize, most: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cpu::Threads;
-    use crate::cpu::tree::{Members, Upkeep};
+    use crate::cpu::{Members, Threads, Upkeep};
     use crate::load::SceneStats;
     use crate::splitmix::mix;
     use crate::{Filter, Membership};

@@ -7,15 +7,12 @@
 //! most twice that of the best decisions in hindsight (the ski-rental bound).
 
 use super::{Members, Tree};
-use crate::aabb::Aabb;
 use crate::clock::{Instant, elapsed_ns};
 use crate::cpu::mean_time::MeanTime;
-use crate::cpu::outputs::Outputs;
-use crate::cpu::workers::Workers;
-use crate::error::Error;
+use crate::cpu::{Outputs, Workers};
 use crate::filter::Screen;
 use crate::load::{FramePlan, SceneStats};
-use crate::pairs::Pairs;
+use crate::{Aabb, Error, Pairs};
 
 /// Frames in which no refit is tried after one that was in vain, at most.
 const MOST_PAUSE: u32 = 64;

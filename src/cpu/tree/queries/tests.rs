@@ -1,7 +1,5 @@
 use super::*;
-use crate::cpu::level::Simd;
-use crate::cpu::tree::Members;
-use crate::cpu::workers::Workers;
+use crate::cpu::{Members, Simd, Workers};
 use crate::load::SceneStats;
 use crate::splitmix;
 
