@@ -51,6 +51,7 @@ impl BroadPhase for Bvh {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cpu::Input;
     use crate::scene::{Scenario, Scene};
 
     /// Without a clock, so that the test does not depend on the machine.
@@ -60,8 +61,8 @@ mod tests {
             let (mut tree, mut upkeep) = (Tree::new(Simd::Portable), Upkeep::new(false));
             let mut scene = Scene::start(scenario, 2000, 1);
             (0..100).for_each(|_| {
-                let boxes = scene.boxes();
-                upkeep.update(&mut tree, &Workers::one(), boxes, || FramePlan::default().stats(boxes), None).unwrap();
+                let input = Input { workers: &Workers::one(), boxes: scene.boxes(), screen: None };
+                upkeep.update(&mut tree, input, &FramePlan::default()).unwrap();
                 scene.advance();
             });
             upkeep.builds()

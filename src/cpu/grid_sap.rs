@@ -14,14 +14,15 @@
 //! has several tasks a thread: for each strip, a task gathers the bins of all threads, sorts them along the sweep axis
 //! and sweeps.
 //!
-//! Oversized boxes, the boxes of overfull strips and [passive](Screen) boxes go into a separate [tree](super::tree).
-//! Its boxes are compared with each other, but for two passive ones, and with the boxes of every strip.
+//! Oversized boxes, the boxes of overfull strips and [passive](crate::filter::Screen) boxes go into a separate
+//! [tree](super::tree). Its boxes are compared with each other, but for two passive ones, and with the boxes of every
+//! strip.
 
 use crate::broad_phase::check_count;
 use crate::cpu::{
-    Columns, Group, LANES, Members, Outputs, Simd, Threads, Tree, Workers, ensure, order_key, part, reserve, sweep_rows,
+    Columns, Group, Input, LANES, Members, Outputs, Simd, Threads, Tree, Workers, ensure, order_key, part, reserve,
+    sweep_rows,
 };
-use crate::filter::Screen;
 use crate::load::{FramePlan, SceneStats, StripGrid, StripSpan};
 use crate::{Aabb, BroadPhase, Error, Pairs};
 use std::ops::Range;
@@ -104,13 +105,14 @@ impl BroadPhase for GridSap {
         pairs.clear();
         check_count(boxes.len())?;
         let Self { workers, bins, apart, tree, tasks, outputs, simd } = self;
-        let (grid, screen) = (plan.grid(boxes), pairs.screen());
+        let grid = plan.grid(boxes);
         let workers = &workers.fit(boxes.len());
+        let input = Input { workers, boxes, screen: pairs.screen() };
         let _frame = workers.frame()?;
         let threads = workers.threads();
         let (bins, tasks) = (&mut bins[..threads], &mut tasks[..workers.tasks()]);
         workers.try_each_of(bins.iter_mut().enumerate(), |(k, bin)| {
-            bin.fill(&grid, boxes, part(boxes.len(), k, threads), threads, screen)
+            bin.fill(&grid, input, part(boxes.len(), k, threads))
         })?;
         apart.clear();
         reserve(apart, bins.iter().map(|b| b.apart.len()).sum(), "boxes in a tree")?;
@@ -118,7 +120,7 @@ impl BroadPhase for GridSap {
         let tree = if apart.is_empty() {
             None
         } else {
-            tree.build(workers, boxes, Members::Of(apart), &SceneStats::of_members(boxes, apart), screen)?;
+            tree.build(workers, boxes, Members::Of(apart), &SceneStats::of_members(boxes, apart), input.screen)?;
             Some(&*tree)
         };
         let (bins, strips, count) = (&*bins, grid.strips(), tasks.len());
@@ -160,22 +162,12 @@ fn balanced(bins: &[Bins], strips: usize, k: usize, parts: usize) -> usize {
 impl Bins {
     /// Sorts a share of the boxes into bins. The pass that counts works out the strips of each box; the second pass
     /// reuses them.
-    fn fill(
-        &mut self,
-        grid: &StripGrid,
-        boxes: &[Aabb],
-        share: Range<usize>,
-        threads: usize,
-        screen: Option<&Screen>,
-    ) -> Result<(), Error> {
-        let first = share.start;
-        let share = &boxes[share];
-        let strips = grid.strips();
-        ensure(&mut self.starts, strips + 1, "strips")?;
-        ensure(&mut self.spans, share.len(), "boxes in strips")?;
-        let any_apart = self.count(grid, share, first, screen)?;
+    fn fill(&mut self, grid: &StripGrid, input: Input<'_>, share: Range<usize>) -> Result<(), Error> {
+        let (first, strips) = (share.start, grid.strips());
+        let any_apart = self.count(grid, input, share.clone())?;
+        let share = &input.boxes[share];
         self.apart.clear();
-        let most = (MOST_BOXES / threads).max(MOST_OF_SHARE) as u32;
+        let most = (MOST_BOXES / input.workers.threads()).max(MOST_OF_SHARE) as u32;
         if any_apart || self.starts[..strips].iter().any(|&count| count > most) {
             self.set_apart(grid, most, first, share.len())?;
         }
@@ -207,21 +199,17 @@ impl Bins {
     }
 
     /// Finds the strips of each box and counts the boxes of each bin. Returns whether any box goes into the tree.
-    fn count(
-        &mut self,
-        grid: &StripGrid,
-        share: &[Aabb],
-        first: usize,
-        screen: Option<&Screen>,
-    ) -> Result<bool, Error> {
+    fn count(&mut self, grid: &StripGrid, input: Input<'_>, share: Range<usize>) -> Result<bool, Error> {
+        ensure(&mut self.starts, grid.strips() + 1, "strips")?;
+        ensure(&mut self.spans, share.len(), "boxes in strips")?;
         let starts = &mut self.starts[..=grid.strips()];
         starts.fill(0);
         let mut any_apart = false;
-        for ((b, span), k) in share.iter().zip(&mut self.spans).zip(first..) {
+        for ((b, span), k) in input.boxes[share.clone()].iter().zip(&mut self.spans).zip(share) {
             if let Some(defect) = b.defect() {
                 return Err(Error::InvalidBox { index: k, defect });
             }
-            let passive = screen.is_some_and(|s| s.is_passive(k));
+            let passive = input.screen.is_some_and(|s| s.is_passive(k));
             *span = if passive { StripSpan::APART } else { grid.span(b) };
             any_apart |= *span == StripSpan::APART;
             grid.each_strip(*span, |strip, _| starts[strip] += 1);

@@ -39,7 +39,7 @@ pub(crate) use level::Simd;
 pub(crate) use outputs::Outputs;
 pub(crate) use pair_cache::GrownTree;
 pub(crate) use sort::sort;
-pub(crate) use tree::{Members, NOBODY, Near, Upkeep, Wear};
+pub(crate) use tree::{Input, Members, NOBODY, Near, Upkeep, Wear};
 pub(crate) use world::WorldSearch;
 
 use crate::{BroadPhase, Error};

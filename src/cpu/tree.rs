@@ -18,7 +18,7 @@ mod wear;
 use crate::cpu::kernel::bounds::Bounds;
 use crate::cpu::{Group, LANES, Marks, Node, Simd, SimdLevel, Walk, Workers, part, prefetch, reserve};
 use crate::filter::Screen;
-use crate::load::SceneStats;
+use crate::load::{FramePlan, SceneStats};
 use crate::{Aabb, Error, Pairs};
 use curve::Curve;
 use order::Order;
@@ -81,6 +81,14 @@ pub(crate) enum Members<'a> {
     Of(&'a [u32]),
 }
 
+/// The boxes of a frame, what the filter rules out among them, and the threads that work on them.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Input<'a> {
+    pub(crate) workers: &'a Workers,
+    pub(crate) boxes: &'a [Aabb],
+    pub(crate) screen: Option<&'a Screen>,
+}
+
 impl Members<'_> {
     fn len(&self, boxes: &[Aabb]) -> usize {
         match self {
@@ -122,22 +130,20 @@ impl Tree {
         stats: &SceneStats,
         screen: Option<&Screen>,
     ) -> Result<(), Error> {
-        let curve = Curve::over(stats, members.len(boxes));
-        let split = self.order.sort(workers, boxes, members, &curve, screen)?;
-        self.arrange(workers, boxes, curve, split, |_| false, screen)?;
-        self.sweep(workers, boxes);
+        let (input, curve) = (Input { workers, boxes, screen }, Curve::over(stats, members.len(boxes)));
+        let split = self.order.sort(input, members, &curve)?;
+        self.arrange(input, curve, split, |_| false)?;
+        self.sweep(input);
         Ok(())
     }
 
     /// Puts the sorted boxes into leaves. The first `split` of them are active.
     fn arrange(
         &mut self,
-        workers: &Workers,
-        boxes: &[Aabb],
+        input: Input<'_>,
         curve: Curve,
         split: usize,
         out: impl Fn(u32) -> bool + Sync,
-        screen: Option<&Screen>,
     ) -> Result<(), Error> {
         let Self { ids, places: in_use, levels, active, sweeps, order, .. } = self;
         let sorted = order.ids();
@@ -151,39 +157,33 @@ impl Tree {
         let passive = places.len().min(passive_from);
         let (before, behind) = places.split_at_mut(passive);
         let of = |_, &key: &u64| if out(key as u32) { NOBODY } else { key as u32 };
-        workers.map(&sorted[..split], &mut before[..split], of);
-        workers.map(&sorted[split..], behind, of);
+        input.workers.map(&sorted[..split], &mut before[..split], of);
+        input.workers.map(&sorted[split..], behind, of);
         ids[*in_use..].fill(NOBODY);
         sweeps.begin(order.shapes().iter().map(|(long, at)| {
             let by = if at.start < split { 0 } else { passive_from - split };
             Kind { long: *long, leaves: (at.start + by).div_ceil(LANES)..(at.end + by) / LANES }
         }));
-        self.fill(workers, boxes, |_, _| true);
+        self.fill(input, |_, _| true);
         self.leaves.clear();
         self.leaves.extend(self.order.starts().iter().copied().zip(0..));
         (self.curve, self.renewal) = (Some(curve), None);
-        self.mark(workers, screen)
+        self.mark(input)
     }
 
     /// Chooses the pairs that are not found by walking through the tree.
-    fn sweep(&mut self, workers: &Workers, boxes: &[Aabb]) {
+    fn sweep(&mut self, input: Input<'_>) {
         let Self { ids, levels, active, sweeps, order, simd, .. } = self;
         let tree = Walk { levels, ids, far: false, apart: &[], marks: None };
         // Without memory for a sweep, the tree finds its pairs.
-        let _ = sweeps.choose(&tree, *active, *simd, order, workers, boxes);
+        let _ = sweeps.choose(&tree, *active, *simd, order, input);
     }
 
     /// Makes room for the boxes from position `before` on, which are new, in leaves behind all others. Boxes beyond the
     /// last one are taken out by [`refit`](Self::refit). Returns `false` if the tree has to be built instead.
-    fn resize(
-        &mut self,
-        workers: &Workers,
-        boxes: &[Aabb],
-        before: usize,
-        stats: impl FnOnce() -> SceneStats,
-        screen: Option<&Screen>,
-    ) -> bool {
+    fn resize(&mut self, input: Input<'_>, before: usize, plan: &FramePlan) -> bool {
         let Self { ids, places, levels, active, order, .. } = self;
+        let Input { boxes, screen, .. } = input;
         if boxes.len() <= before {
             return true;
         }
@@ -193,8 +193,8 @@ impl Tree {
         if boxes.len() - before > before / 4 || !all_active && !all_passive() {
             return false;
         }
-        let curve = Curve::over(&stats(), boxes.len() - before);
-        if order.sort(workers, boxes, Members::From(before), &curve, None).is_err() {
+        let curve = Curve::over(&plan.stats(boxes), boxes.len() - before);
+        if order.sort(Input { screen: None, ..input }, Members::From(before), &curve).is_err() {
             // A build reports the error.
             return false;
         }
@@ -213,25 +213,26 @@ impl Tree {
 
     /// Gives each box of the tree its present bounds, and takes out those beyond the last one. Returns `false` if a box
     /// is invalid, or has become passive or ceased to be; then the tree is of no use.
-    fn refit(&mut self, workers: &Workers, boxes: &[Aabb], screen: Option<&Screen>) -> bool {
+    fn refit(&mut self, input: Input<'_>) -> bool {
         let passive_from = self.active * LANES;
-        let right = if screen.is_none() && self.places <= passive_from {
-            self.fill(workers, boxes, |_, _| true)
+        let is_passive = |id| input.screen.is_some_and(|s| s.is_passive(id));
+        let right = if input.screen.is_none() && self.places <= passive_from {
+            self.fill(input, |_, _| true)
         } else {
-            self.fill(workers, boxes, |place, id| screen.is_some_and(|s| s.is_passive(id)) == (place >= passive_from))
+            self.fill(input, |place, id| is_passive(id) == (place >= passive_from))
         };
         // A build reports an error.
-        if !right || self.mark(workers, screen).is_err() {
+        if !right || self.mark(input).is_err() {
             return false;
         }
-        self.sweep(workers, boxes);
+        self.sweep(input);
         true
     }
 
     /// Writes the bounds of all boxes to the leaves, and those of the leaves to the nodes above. Returns whether every
     /// box is valid and `belongs` to its place.
-    fn fill(&mut self, workers: &Workers, boxes: &[Aabb], belongs: impl Fn(usize, usize) -> bool + Sync) -> bool {
-        let Self { ids, levels, .. } = self;
+    fn fill(&mut self, input: Input<'_>, belongs: impl Fn(usize, usize) -> bool + Sync) -> bool {
+        let (Self { ids, levels, .. }, Input { workers, boxes, .. }) = (self, input);
         let used = levels.iter().rposition(|level| !level.is_empty()).map_or(0, |top| top + 1);
         let (leaves, above) = levels.split_at_mut(1);
         let parents = &mut above[0];
@@ -282,7 +283,7 @@ impl Tree {
     }
 
     /// Writes the memberships of all boxes to the leaves, and their unions to the nodes above.
-    fn mark(&mut self, workers: &Workers, screen: Option<&Screen>) -> Result<(), Error> {
+    fn mark(&mut self, Input { workers, screen, .. }: Input<'_>) -> Result<(), Error> {
         let Self { ids, levels, marks, .. } = self;
         let Some(screen) = screen.filter(|screen| screen.is_partial()) else {
             marks.clear();
@@ -347,7 +348,7 @@ impl Tree {
     /// As [`build`](Self::build).
     pub(crate) fn sort_others(&mut self, workers: &Workers, boxes: &[Aabb]) -> Result<(), Error> {
         let curve = self.curve.take().unwrap_or_else(|| Curve::over(&SceneStats::of(boxes), boxes.len()));
-        self.order.sort(workers, boxes, Members::From(0), &curve, None).map(drop)
+        self.order.sort(Input { workers, boxes, screen: None }, Members::From(0), &curve).map(drop)
     }
 
     /// Returns the sorted boxes: their positions are in the lower halves.

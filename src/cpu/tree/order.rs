@@ -1,7 +1,7 @@
 //! Sorts boxes along a space-filling curve.
 
-use super::Members;
 use super::curve::{Curve, Spread};
+use super::{Input, Members};
 use crate::cpu::{LANES, Workers, ensure, order_key, sort};
 use crate::filter::Screen;
 use crate::{Aabb, Error};
@@ -59,15 +59,9 @@ impl Order {
 
     /// Sorts the boxes at these positions by lower bound on an axis. The lower halves of the keys are places in
     /// `members`. Members without a box come last.
-    pub(super) fn sort_along(
-        &mut self,
-        workers: &Workers,
-        boxes: &[Aabb],
-        members: &[u32],
-        axis: usize,
-    ) -> Result<(), Error> {
-        self.len = members.len();
-        ensure(&mut self.keys, self.len, "sort keys")?;
+    pub(super) fn sort_along(&mut self, input: Input<'_>, members: &[u32], axis: usize) -> Result<(), Error> {
+        let Input { workers, boxes, .. } = input;
+        self.begin(members.len())?;
         let keys = &mut self.keys[..self.len];
         workers.map(members, keys, |at, &id| {
             let low = boxes.get(id as usize).map_or(u32::MAX, |b| order_key(b.min[axis]));
@@ -77,18 +71,11 @@ impl Order {
     }
 
     /// Sorts the members. Returns the number of active boxes; they come first.
-    pub(super) fn sort(
-        &mut self,
-        workers: &Workers,
-        boxes: &[Aabb],
-        members: Members<'_>,
-        curve: &Curve,
-        screen: Option<&Screen>,
-    ) -> Result<usize, Error> {
-        let len = members.len(boxes);
+    pub(super) fn sort(&mut self, input: Input<'_>, members: Members<'_>, curve: &Curve) -> Result<usize, Error> {
+        let len = members.len(input.boxes);
         self.begin(len)?;
-        self.code(workers, boxes, members, 0..len, curve, screen)?;
-        self.finish(workers, boxes)
+        self.code(input, members, 0..len, curve)?;
+        self.finish(input)
     }
 
     /// Begins to sort this many members. [`code`](Self::code) of all of them and [`finish`](Self::finish) follow.
@@ -100,12 +87,10 @@ impl Order {
     /// Makes the keys of a part of the members.
     pub(super) fn code(
         &mut self,
-        workers: &Workers,
-        boxes: &[Aabb],
+        Input { workers, boxes, screen }: Input<'_>,
         members: Members<'_>,
         part: Range<usize>,
         curve: &Curve,
-        screen: Option<&Screen>,
     ) -> Result<(), Error> {
         let keys = &mut self.keys[part.clone()];
         let invalid = AtomicUsize::new(usize::MAX);
@@ -134,7 +119,7 @@ impl Order {
     }
 
     /// Sorts all keys. Returns the number of active boxes; they come first.
-    pub(super) fn finish(&mut self, workers: &Workers, boxes: &[Aabb]) -> Result<usize, Error> {
+    pub(super) fn finish(&mut self, Input { workers, boxes, .. }: Input<'_>) -> Result<usize, Error> {
         let keys = &mut self.keys[..self.len];
         sort(workers, keys, &mut self.scratch)?;
         let active = keys.partition_point(|&key| code(key) < PASSIVE);
@@ -260,7 +245,7 @@ mod tests {
         let workers = Workers::new("tree", threads, &Threads::default());
         let mut order = Order::default();
         let curve = Curve::over(&SceneStats::of(boxes), boxes.len());
-        let moving = order.sort(&workers, boxes, Members::From(0), &curve, screen).unwrap();
+        let moving = order.sort(Input { workers: &workers, boxes, screen }, Members::From(0), &curve).unwrap();
         (order.ids().iter().map(|&key| key as u32).collect(), moving)
     }
 

@@ -1,7 +1,7 @@
 //! Sorts all boxes of a tree anew, in steps of which none takes long.
 
 use super::curve::Curve;
-use super::{Members, Tree};
+use super::{Input, Members, Tree};
 use crate::cpu::{Workers, part};
 use crate::filter::Screen;
 use crate::load::SceneStats;
@@ -33,7 +33,7 @@ impl Tree {
         stats: impl FnOnce() -> SceneStats,
         screen: Option<&Screen>,
     ) -> Result<bool, Error> {
-        let (len, all) = (boxes.len(), Members::From(0));
+        let (len, input) = (boxes.len(), Input { workers, boxes, screen });
         let begin = || Renewal { curve: Curve::over(&stats(), len), boxes: len, step: 0, active: 0 };
         let mut renewal = self.renewal.take().filter(|renewal| renewal.boxes == len).unwrap_or_else(begin);
         if renewal.step <= RENEWAL_PARTS {
@@ -47,12 +47,12 @@ impl Tree {
                 if step == 0 {
                     self.order.begin(len)?;
                 }
-                self.order.code(workers, boxes, all, part(len, step, RENEWAL_PARTS), &renewal.curve, screen)?;
+                self.order.code(input, Members::From(0), part(len, step, RENEWAL_PARTS), &renewal.curve)?;
             }
-            RENEWAL_PARTS => renewal.active = self.order.finish(workers, boxes)?,
+            RENEWAL_PARTS => renewal.active = self.order.finish(input)?,
             _ => {
                 let Renewal { curve, active, .. } = renewal;
-                return self.arrange(workers, boxes, curve, active, out, screen).map(|()| true);
+                return self.arrange(input, curve, active, out).map(|()| true);
             }
         }
         renewal.step += 1;

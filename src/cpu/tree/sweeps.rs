@@ -5,9 +5,9 @@
 //! along z, a leaf of one copy meets few leaves of the other.
 
 use super::order::Order;
-use super::{Tree, lay_out};
+use super::{Input, Tree, lay_out};
 use crate::cpu::kernel::walk::{Apart, SAMPLE};
-use crate::cpu::{LANES, Simd, Walk, Workers, part};
+use crate::cpu::{LANES, Simd, Walk, part};
 use crate::{Aabb, Error, Pairs};
 use std::ops::Range;
 
@@ -58,8 +58,7 @@ impl Sweeps {
         active: usize,
         simd: Simd,
         order: &mut Order,
-        workers: &Workers,
-        boxes: &[Aabb],
+        input: Input<'_>,
     ) -> Result<(), Error> {
         let Self { kinds, sorted, swept, apart } = self;
         swept.clear();
@@ -86,7 +85,7 @@ impl Sweeps {
                     }
                     sorted.resize_with(sorted.len().max(at + 1), || Tree::new(simd));
                     let ids = &tree.ids[kind.leaves.start * LANES..kind.leaves.end * LANES];
-                    sorted[at].build_along(order, workers, boxes, ids, axis)?;
+                    sorted[at].build_along(order, input, ids, axis)?;
                     is_sorted |= 1 << at;
                 }
                 let [a_sorted, b_sorted] = both.map(|at| sorted[at].walk());
@@ -113,19 +112,12 @@ impl Sweeps {
 
 impl Tree {
     /// Builds the tree of the boxes at these positions, sorted by lower bound on an axis.
-    fn build_along(
-        &mut self,
-        order: &mut Order,
-        workers: &Workers,
-        boxes: &[Aabb],
-        members: &[u32],
-        axis: usize,
-    ) -> Result<(), Error> {
+    fn build_along(&mut self, order: &mut Order, input: Input<'_>, members: &[u32], axis: usize) -> Result<(), Error> {
         let Self { ids, levels, .. } = self;
-        order.sort_along(workers, boxes, members, axis)?;
+        order.sort_along(input, members, axis)?;
         lay_out(levels, ids, members.len())?;
-        workers.map(order.ids(), ids, |_, &key| members[key as u32 as usize]);
-        self.fill(workers, boxes, |_, _| true);
+        input.workers.map(order.ids(), ids, |_, &key| members[key as u32 as usize]);
+        self.fill(input, |_, _| true);
         Ok(())
     }
 }
@@ -161,8 +153,8 @@ fn begun_within(a: &Walk<'_>, b: &Walk<'_>, axis: usize, most: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cpu::{Members, Threads, Upkeep};
-    use crate::load::SceneStats;
+    use crate::cpu::{Members, Threads, Upkeep, Workers};
+    use crate::load::{FramePlan, SceneStats};
     use crate::splitmix::mix;
     use crate::{Filter, Membership};
 
@@ -220,7 +212,8 @@ mod tests {
             expected.set_filter(filter.clone());
             oracle.find_pairs(&boxes, &mut expected).unwrap();
             for (tree, upkeep) in &mut trees {
-                upkeep.update(tree, &workers, &boxes, || SceneStats::of(&boxes), expected.screen()).unwrap();
+                let input = Input { workers: &workers, boxes: &boxes, screen: expected.screen() };
+                upkeep.update(tree, input, &FramePlan::default()).unwrap();
                 let mut pairs = Pairs::new();
                 pairs.set_filter(filter.clone());
                 (0..5).for_each(|k| tree.self_pairs(k, 5, &mut pairs));

@@ -6,12 +6,11 @@
 //! at a constant rate, no other number of frames between two builds is cheaper; and however it grows, the cost is at
 //! most twice that of the best decisions in hindsight (the ski-rental bound).
 
-use super::{Members, Tree};
+use super::{Input, Members, Tree};
 use crate::clock::{Instant, elapsed_ns};
 use crate::cpu::mean_time::MeanTime;
 use crate::cpu::{Outputs, Workers};
-use crate::filter::Screen;
-use crate::load::{FramePlan, SceneStats};
+use crate::load::FramePlan;
 use crate::{Aabb, Error, Pairs};
 
 /// Frames in which no refit is tried after one that was in vain, at most.
@@ -85,7 +84,8 @@ impl Upkeep {
         outputs: &mut Outputs,
         pairs: &mut Pairs,
     ) -> Result<f64, Error> {
-        let updating = self.update(tree, workers, boxes, || plan.stats(boxes), pairs.screen())?;
+        let input = Input { workers, boxes, screen: pairs.screen() };
+        let updating = self.update(tree, input, plan)?;
         let started = Instant::now();
         outputs.find(workers, pairs, |k, parts, list| tree.self_pairs(k, parts, list));
         let searching = each_ns(started, boxes.len());
@@ -93,25 +93,19 @@ impl Upkeep {
         Ok(updating + searching)
     }
 
-    /// Refits or builds the tree of these boxes. `stats` returns their statistics. Returns the nanoseconds that this
-    /// took for each box, without those of a refit in vain.
+    /// Refits or builds the tree of these boxes. Returns the nanoseconds that this took for each box, without those of a
+    /// refit in vain.
     ///
     /// # Errors
     /// [`Error::InvalidBox`] for the first invalid box, and [`Error::OutOfMemory`].
-    pub(crate) fn update(
-        &mut self,
-        tree: &mut Tree,
-        workers: &Workers,
-        boxes: &[Aabb],
-        stats: impl Fn() -> SceneStats,
-        screen: Option<&Screen>,
-    ) -> Result<f64, Error> {
-        if let Some(refit) = self.refitted(tree, workers, boxes, &stats, screen) {
+    pub(crate) fn update(&mut self, tree: &mut Tree, input: Input<'_>, plan: &FramePlan) -> Result<f64, Error> {
+        if let Some(refit) = self.refitted(tree, input, plan) {
             return Ok(refit);
         }
+        let Input { workers, boxes, screen } = input;
         self.tree = None;
         let started = Instant::now();
-        let stats = stats();
+        let stats = plan.stats(boxes);
         tree.build(workers, boxes, Members::From(0), &stats, screen)?;
         #[cfg(test)]
         (self.builds += 1);
@@ -124,15 +118,8 @@ impl Upkeep {
     }
 
     /// Refits the tree if that pays, and returns the nanoseconds for each box. If not, the tree is of no use.
-    fn refitted(
-        &mut self,
-        tree: &mut Tree,
-        workers: &Workers,
-        boxes: &[Aabb],
-        stats: impl Fn() -> SceneStats,
-        screen: Option<&Screen>,
-    ) -> Option<f64> {
-        let mut known = self.tree?;
+    fn refitted(&mut self, tree: &mut Tree, input: Input<'_>, plan: &FramePlan) -> Option<f64> {
+        let (mut known, boxes) = (self.tree?, input.boxes);
         let price = self.price();
         if self.pause > 0 {
             self.pause -= 1;
@@ -143,7 +130,7 @@ impl Upkeep {
             return None;
         }
         let started = Instant::now();
-        if !tree.resize(workers, boxes, known.boxes, stats, screen) || !tree.refit(workers, boxes, screen) {
+        if !tree.resize(input, known.boxes, plan) || !tree.refit(input) {
             return None;
         }
         let area = tree.half_area(known.longest) / boxes.len() as f64;
