@@ -250,7 +250,7 @@ impl std::fmt::Debug for Phases {
 }
 
 #[cfg(all(test, shuttle))]
-mod checked;
+mod shuttle_tests;
 
 #[cfg(all(test, not(shuttle)))]
 mod tests {
