@@ -1,6 +1,6 @@
 //! Arrays of a caller, and lists for it.
 
-use crate::status::{Failure, sw_status::*};
+use crate::{Failure, sw_status::*};
 use sapwise::Handle;
 
 /// Borrows an array. NULL is an empty one.

@@ -1,6 +1,6 @@
 //! What a body may meet.
 
-use crate::status::{Failure, sw_status::*};
+use crate::{Failure, sw_status::*};
 use sapwise::Body;
 
 /// What a body may meet. Initialise it with SW_BODY_DEFAULT.

@@ -1,7 +1,6 @@
 //! Boxes in the memory of a caller.
 
-use crate::arrays::{check, put, slice};
-use crate::status::{Failure, call, sw_status, sw_status::*};
+use crate::{Failure, call, check, put, slice, sw_status, sw_status::*};
 use sapwise::{Aabb, Error};
 use std::marker::PhantomData;
 

@@ -1,6 +1,6 @@
 //! What a caller holds a pointer to: used by one call that changes it, or by several that read it.
 
-use crate::status::{Failure, sw_status::*};
+use crate::{Failure, sw_status::*};
 use std::cell::UnsafeCell;
 use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicU32, Ordering};

@@ -15,6 +15,11 @@ mod space;
 mod status;
 mod text;
 
+use arrays::{check, flat, put, slice};
+use boxes::{Boxes, one};
+use guarded::Guarded;
+use status::{Failure, call, value};
+
 pub use body::*;
 pub use boxes::{sw_box_from_doubles, sw_box_sweep};
 pub use options::*;

@@ -1,7 +1,6 @@
 //! How pairs are searched.
 
-use crate::status::{Failure, sw_status::*};
-use crate::text;
+use crate::{Failure, sw_status::*, text};
 use sapwise::{Adaptive, AlgorithmId, Error, Registry, Tuning};
 use sapwise_tune::{SaveError, StartOptions};
 use std::ffi::c_char;

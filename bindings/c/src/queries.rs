@@ -1,10 +1,7 @@
 //! Queries of a space.
 
-use crate::arrays::put;
-use crate::body::sw_body;
-use crate::boxes::{Boxes, corner, one};
-use crate::space::sw_space;
-use crate::status::{Failure, call, sw_status};
+use crate::boxes::corner;
+use crate::{Boxes, Failure, call, one, put, sw_body, sw_space, sw_status};
 use sapwise::{Handle, Ray, View};
 use std::ffi::{c_int, c_void};
 

@@ -1,12 +1,8 @@
 //! Pairs of boxes in arrays.
 
-use crate::arrays::{flat, put, slice};
-use crate::body::sw_body;
-use crate::boxes::Boxes;
-use crate::guarded::{self, Guarded};
-use crate::options::{save, sw_options};
-use crate::status::{Failure, call, sw_status, value};
-use crate::text;
+use crate::{
+    Boxes, Failure, Guarded, call, flat, guarded, put, save, slice, sw_body, sw_options, sw_status, text, value,
+};
 use sapwise::{Aabb, Adaptive, Between, BroadPhase, Error, Filter, PairOrder, Pairs};
 use std::ffi::c_char;
 use std::ptr::{null, null_mut};

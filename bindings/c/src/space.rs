@@ -1,12 +1,11 @@
 //! Bodies with handles.
 
-use crate::arrays::{check, flat, handle, handles, put, slice};
-use crate::body::sw_body;
-use crate::boxes::{Boxes, one};
-use crate::guarded::{self, Guarded};
-use crate::options::{SW_MEASURE, save, sw_options};
-use crate::status::{Failure, call, stale, sw_status, value};
-use crate::text;
+use crate::arrays::{handle, handles};
+use crate::status::stale;
+use crate::{
+    Boxes, Failure, Guarded, SW_MEASURE, call, check, flat, guarded, one, put, save, slice, sw_body, sw_options,
+    sw_status, text, value,
+};
 use sapwise::{Aabb, Body, Error, Handle, Space};
 use std::ffi::c_char;
 use std::ptr::{null, null_mut};

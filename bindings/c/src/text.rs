@@ -1,7 +1,6 @@
 //! Texts of a caller, and for it.
 
-use crate::arrays::put;
-use crate::status::{Failure, sw_status::*};
+use crate::{Failure, put, sw_status::*};
 use sapwise::Adaptive;
 use sapwise_tune::Origin;
 use std::ffi::{CStr, c_char};

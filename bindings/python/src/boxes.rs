@@ -1,6 +1,6 @@
 //! The boxes of a caller: borrowed if they have the layout of the library, else rounded outward.
 
-use crate::error::{call, exception, invalid_box};
+use crate::{call, exception, invalid_box};
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use sapwise::error::BoxDefect;

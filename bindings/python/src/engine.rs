@@ -1,9 +1,6 @@
 //! What searches for `pairs` and `pairs_between`, kept from call to call.
 
-use crate::boxes::Corners;
-use crate::decision::PyDecision;
-use crate::error::unusable;
-use crate::start;
+use crate::{Corners, PyDecision, start, unusable};
 use numpy::IntoPyArray;
 use numpy::PyArray2;
 use numpy::ndarray::Array2;

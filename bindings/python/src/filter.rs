@@ -1,6 +1,6 @@
 //! The keywords `groups`, `masks`, `owner` and `fixed`.
 
-use crate::error::call;
+use crate::call;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use sapwise::Membership;

@@ -1,13 +1,9 @@
 //! The class `BroadPhase`.
 
-use crate::boxes::boxes;
 use crate::engine::two_columns;
-use crate::error::{call, exception, unusable};
-use crate::filter::Keywords;
 use crate::frame::{Flat, Frames, Ids};
-use crate::held::{Held, learning_methods};
-use crate::start::{self, Start};
-use crate::tuning::PyTuning;
+use crate::start::{self};
+use crate::{Held, Keywords, PyTuning, Start, boxes, call, exception, learning_methods, unusable};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use sapwise::Membership;

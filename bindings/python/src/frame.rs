@@ -1,8 +1,7 @@
 //! The frames of a `BroadPhase`.
 
 use crate::engine::flat;
-use crate::held::Searcher;
-use crate::start::Start;
+use crate::{Searcher, Start};
 use sapwise::{Aabb, Adaptive, BroadPhase, Changes, Error, Filter, Membership, Pairs};
 use std::sync::{Arc, RwLock};
 

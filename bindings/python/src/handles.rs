@@ -1,6 +1,7 @@
 //! Handles of a space as arrays of NumPy.
 
-use crate::error::{call, stale};
+use crate::call;
+use crate::error::stale;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use sapwise::{Error, Handle, Space};

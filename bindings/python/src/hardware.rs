@@ -1,6 +1,6 @@
 //! Measures the hardware in this process, one family of parameters after another.
 
-use crate::error::failed;
+use crate::failed;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use sapwise_tune::ParameterId;

@@ -1,9 +1,7 @@
 //! What a class holds that searches and learns: behind a lock, made anew after a fork, saved at the end of a block.
 
-use crate::decision::PyDecision;
-use crate::error::{call, failed, with_cause};
-use crate::start::{self, Start};
-use crate::tuning::PyTuning;
+use crate::start::{self};
+use crate::{PyDecision, PyTuning, Start, call, failed, with_cause};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use sapwise::Adaptive;

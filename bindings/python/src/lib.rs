@@ -18,6 +18,15 @@ mod start;
 mod tuning;
 mod view;
 
+use boxes::{Corners, boxes, kept};
+use decision::PyDecision;
+use error::{call, exception, failed, invalid_box, unusable, with_cause};
+use filter::Keywords;
+use handles::array;
+use held::{Held, Searcher, learning_methods};
+use start::Start;
+use tuning::PyTuning;
+
 use pyo3::prelude::*;
 
 #[pymodule]

@@ -1,11 +1,8 @@
 //! `pairs` and `pairs_between`: each call stands for itself.
 
-use crate::boxes::{Boxes, Corners, boxes};
-use crate::decision::PyDecision;
+use crate::boxes::Boxes;
 use crate::engine::{Exactly, Search, What, search};
-use crate::error::{call, exception, invalid_box, unusable};
-use crate::filter::Keywords;
-use crate::start;
+use crate::{Corners, Keywords, PyDecision, boxes, call, exception, invalid_box, start, unusable};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use sapwise::{Aabb, Error, Filter, Membership};
@@ -174,7 +171,7 @@ pub(crate) fn pairs<'py>(
     #[pyo3(from_py_with = start::limit)] limit: Option<usize>,
 ) -> PyResult<Bound<'py, PyArray2<u32>>> {
     let py = boxes.py();
-    let given = crate::boxes::boxes(boxes, upper, "")?;
+    let given = crate::boxes(boxes, upper, "")?;
     let count = given.as_slice()?.len();
     let filter = Keywords { groups, masks, owner, fixed }.memberships(py, count)?;
     let worlds = self::worlds(py, worlds, count)?;

@@ -1,10 +1,7 @@
 //! The pickles of spaces: the library's snapshot in the format of postcard.
 
-use crate::error::{failed, unusable};
-use crate::held::Held;
 use crate::space::PySpace;
-use crate::start::Start;
-use crate::tuning::PyTuning;
+use crate::{Held, PyTuning, Start, failed, unusable};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use sapwise::Space;

@@ -1,13 +1,11 @@
 //! The class `Space`.
 
-use crate::boxes::kept;
-use crate::error::{exception, invalid_box, unusable};
-use crate::filter::Keywords;
-use crate::handles::{array, bits, check, first_stale, handles, pairs};
-use crate::held::{Held, Searcher, learning_methods};
-use crate::start::{self, Start};
-use crate::tuning::PyTuning;
+use crate::handles::{bits, check, first_stale, handles, pairs};
+use crate::start::{self};
 use crate::view::PyView;
+use crate::{
+    Held, Keywords, PyTuning, Searcher, Start, array, exception, invalid_box, kept, learning_methods, unusable,
+};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use sapwise::{Aabb, Adaptive, Body, Error, Handle, Membership, Space};

@@ -1,7 +1,6 @@
 //! The arguments with which a broad phase starts.
 
-use crate::error::{exception, unusable};
-use crate::tuning::PyTuning;
+use crate::{PyTuning, exception, unusable};
 use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
 use sapwise::{Adaptive, Error, PairOrder, Pairs, Registry, Tuning};

@@ -1,8 +1,6 @@
 //! `predict` and the class `Tuning`.
 
-use crate::boxes::boxes;
-use crate::error::{failed, unusable, with_cause};
-use crate::start;
+use crate::{boxes, failed, start, unusable, with_cause};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use sapwise::Tuning;

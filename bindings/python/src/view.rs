@@ -1,10 +1,7 @@
 //! The class `View`: queries of a space.
 
-use crate::boxes::kept;
-use crate::error::{call, exception, invalid_ray, unusable};
-use crate::handles::array;
-use crate::held::Held;
-use crate::start;
+use crate::error::invalid_ray;
+use crate::{Held, array, call, exception, kept, start, unusable};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use sapwise::{Aabb, Body, Error, Handle, Ray, Space, View};

@@ -1,6 +1,6 @@
 //! The GPUs of this machine.
 
-use super::device::Gpu;
+use super::Gpu;
 use sapwise::error::{GpuError, GpuErrorKind};
 use sapwise::internals::{GpuIdentity, GpuKind};
 use std::sync::{Arc, Mutex, PoisonError};

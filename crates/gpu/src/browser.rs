@@ -1,9 +1,7 @@
 //! A method on WebGPU in a browser, which nothing may block.
 
-use super::adapters::{adapters, identity};
-use super::device::Gpu;
-use super::engine::Engine;
-use super::failure::{Failure, unavailable};
+use super::adapters::adapters;
+use super::{Engine, Failure, Gpu, identity, unavailable};
 use sapwise::algorithm::{Backend, FramePlan};
 use sapwise::error::{GpuError, GpuErrorKind, ParseIdError};
 use sapwise::internals::Workers;

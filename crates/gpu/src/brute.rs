@@ -1,12 +1,7 @@
 //! Every box against every other; see `shaders/brute.wgsl`.
 
-use super::device::Gpu;
 use super::kernel::source;
-use super::look::Look;
-use super::output::Output;
-use super::pairing::Pairing;
-use super::params::Params;
-use super::search::{Inputs, Search};
+use super::{Gpu, Inputs, Look, Output, Pairing, Params, Search};
 use sapwise::error::GpuError;
 
 /// Boxes of a tile.

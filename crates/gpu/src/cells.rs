@@ -1,9 +1,8 @@
 //! Counting sort by cell, which also makes the table of where each cell begins; see `shaders/cells.wgsl`.
 
-use super::device::Gpu;
-use super::kernel::{Bound, Kernel, source};
-use super::params::{CELLS_OF_BLOCK, Params};
-use super::storage::Storage;
+use super::kernel::source;
+use super::params::CELLS_OF_BLOCK;
+use super::{Bound, Gpu, Kernel, Params, Storage};
 use sapwise::error::GpuError;
 
 /// Boxes of one workgroup.

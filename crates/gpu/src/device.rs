@@ -1,8 +1,8 @@
 //! An open GPU: device, queue, limits, and what went wrong with it.
 
-use super::late::Late;
-use super::scope::{Recording, Scope};
-use super::watch::{Place, Watch};
+use super::scope::Scope;
+use super::watch::Watch;
+use super::{Late, Place, Recording};
 use sapwise::error::{GpuError, GpuErrorKind};
 use sapwise::internals::GpuIdentity;
 use std::fmt;

@@ -1,7 +1,6 @@
 //! Kernels: compiled once, bound to buffers, dispatched.
 
-use super::device::Gpu;
-use super::watch::Place;
+use super::{Gpu, Place};
 use sapwise::error::GpuError;
 
 /// An entry point of a shader, compiled for one GPU.

@@ -81,6 +81,19 @@ mod tree;
 #[doc(hidden)]
 pub mod watch;
 
+use engine::Engine;
+use failure::{Failure, unavailable};
+use kernel::{Bound, Kernel};
+use late::Late;
+use look::Look;
+use output::{Output, PAIR};
+use pairing::Pairing;
+use params::{Header, Params};
+use search::{Inputs, Search};
+use slabs::Slabs;
+use storage::{Storage, constant, largest};
+use watch::Place;
+
 #[cfg(test)]
 pub(crate) use adapters::first_for_tests;
 pub use adapters::{Gpus, identity};

@@ -1,7 +1,6 @@
 //! The filter on pairs, on a GPU; see `shaders/filter.wgsl`.
 
-use super::device::Gpu;
-use super::storage::Storage;
+use super::{Gpu, Storage};
 use sapwise::Filter;
 use sapwise::error::GpuError;
 

@@ -1,10 +1,7 @@
 //! A method on one or several GPUs, from boxes in host memory to pairs in host memory.
 
-use super::Gpu;
-use super::failure::{Failure, unavailable};
-use super::look::Look;
 use super::share::{Share, sizes, worst};
-use super::slabs::Slabs;
+use super::{Failure, Gpu, Look, Slabs, unavailable};
 use sapwise::algorithm::{Backend, FramePlan, usable_cores};
 use sapwise::error::{GpuError, ParseIdError};
 use sapwise::internals::{SceneStats, Threads, Workers, check_count};

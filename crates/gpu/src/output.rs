@@ -1,8 +1,7 @@
 //! The counts of the pairs of each block, their positions, and the list of pairs.
 
-use super::device::Gpu;
-use super::kernel::{Bound, Kernel, source};
-use super::storage::{Storage, largest};
+use super::kernel::source;
+use super::{Bound, Gpu, Kernel, Storage, largest};
 use sapwise::error::GpuError;
 
 /// Counts that `positions` reads at once.

@@ -1,9 +1,7 @@
 //! The two kernels of a method that count and write its pairs, and their variants with the test of a filter.
 
-use super::device::Gpu;
-use super::kernel::{Bound, Kernel, source};
-use super::output::Output;
-use super::search::Inputs;
+use super::kernel::source;
+use super::{Bound, Gpu, Inputs, Kernel, Output};
 use sapwise::error::GpuError;
 
 #[derive(Debug)]

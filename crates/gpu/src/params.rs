@@ -1,7 +1,7 @@
 //! The parameters of a frame, as the kernels see them.
 
+use super::Look;
 use super::division::{PARTS, Segment};
-use super::look::Look;
 use super::tree::raises;
 use sapwise::error::BoxDefect;
 use sapwise::internals::StripGrid;

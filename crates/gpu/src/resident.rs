@@ -1,10 +1,6 @@
 //! A method on one GPU, from boxes on the GPU to pairs on the GPU.
 
-use super::device::Gpu;
-use super::engine::Engine;
-use super::failure::{Failure, unavailable};
-use super::look::Look;
-use super::params::Params;
+use super::{Engine, Failure, Gpu, Look, Params, unavailable};
 use sapwise::algorithm::Backend;
 use sapwise::error::{BoxDefect, ParseIdError};
 use sapwise::internals::SampledBoxes;

@@ -1,8 +1,7 @@
 //! A sample of boxes that are on the GPU; see `shaders/sample.wgsl`.
 
-use super::device::Gpu;
-use super::kernel::{Bound, Kernel, source};
-use super::storage::Storage;
+use super::kernel::source;
+use super::{Bound, Gpu, Kernel, Storage};
 use sapwise::Aabb;
 use sapwise::error::GpuError;
 

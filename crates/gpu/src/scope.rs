@@ -1,7 +1,7 @@
 //! Error scopes: they catch a device's errors about our calls, so that its handlers, which may be the program's,
 //! never see them.
 
-use super::late::Late;
+use super::Late;
 use std::ops::{Deref, DerefMut};
 
 /// Catches the errors of this thread's calls, of one kind or of every kind, until it ends.

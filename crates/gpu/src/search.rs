@@ -1,10 +1,6 @@
 //! What an engine asks of a method.
 
-use super::Gpu;
-use super::look::Look;
-use super::output::Output;
-use super::pairing::Pairing;
-use super::params::Params;
+use super::{Gpu, Look, Output, Pairing, Params};
 use sapwise::error::GpuError;
 use std::fmt::Debug;
 

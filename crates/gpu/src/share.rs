@@ -1,10 +1,7 @@
 //! One of the GPUs that share a frame, and how much of it each gets.
 
-use super::Gpu;
-use super::engine::Engine;
-use super::failure::Failure;
-use super::look::Look;
-use super::slabs::{Members, Slabs};
+use super::slabs::Members;
+use super::{Engine, Failure, Gpu, Look, Slabs};
 use sapwise::error::GpuError;
 use sapwise::internals::{SampledBoxes, Workers};
 use sapwise::{Aabb, Pairs};

@@ -1,9 +1,8 @@
 //! Radix sort of 32-bit keys with their positions; see `shaders/sort.wgsl`.
 
-use super::device::Gpu;
-use super::kernel::{Bound, Kernel, source};
-use super::params::{MOST_PASSES, Params};
-use super::storage::{Storage, constant};
+use super::kernel::source;
+use super::params::MOST_PASSES;
+use super::{Bound, Gpu, Kernel, Params, Storage, constant};
 use sapwise::error::GpuError;
 
 /// Values of a digit.

@@ -1,16 +1,10 @@
 //! The methods that sort the boxes: sap, grid-sap and bvh. See `shaders/rows.wgsl` and the shader of each.
 
 use super::cells::Cells;
-use super::device::Gpu;
-use super::kernel::{Bound, Kernel, source};
-use super::look::Look;
-use super::output::Output;
-use super::pairing::Pairing;
-use super::params::Params;
-use super::search::{Inputs, Search};
+use super::kernel::source;
 use super::sort::Sort;
-use super::storage::Storage;
 use super::tree::Tree;
+use super::{Bound, Gpu, Inputs, Kernel, Look, Output, Pairing, Params, Search, Storage};
 use sapwise::error::GpuError;
 
 /// Rows of one block, and boxes of one workgroup of the other kernels.

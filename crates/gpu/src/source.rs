@@ -1,9 +1,8 @@
 //! GPUs as a source of algorithms for a [`Registry`].
 
-use super::adapters::Gpus;
-use super::failure::unavailable;
-use super::methods::{algorithms, has_method};
+use super::methods::has_method;
 use super::on_gpus::OnGpus;
+use super::{Gpus, algorithms, unavailable};
 use sapwise::algorithm::{AlgorithmSource, Backend, Entry};
 use sapwise::error::GpuError;
 use sapwise::{AlgorithmId, BroadPhase, Error, Registry};

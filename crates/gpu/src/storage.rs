@@ -1,6 +1,6 @@
 //! Buffers on a GPU.
 
-use super::device::Gpu;
+use super::Gpu;
 use sapwise::error::{GpuError, GpuErrorKind};
 use wgpu::util::DeviceExt;
 

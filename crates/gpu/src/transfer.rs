@@ -1,7 +1,6 @@
 //! Buffers that both the CPU and a GPU reach: mapped once, used every frame.
 
-use super::device::Gpu;
-use super::storage::Storage;
+use super::{Gpu, Storage};
 use sapwise::error::GpuError;
 use sapwise::internals::Workers;
 use std::iter;

@@ -1,8 +1,7 @@
 //! The levels of a tree over sorted boxes; see `shaders/tree.wgsl`.
 
-use super::device::Gpu;
-use super::kernel::{Bound, Kernel, source};
-use super::storage::constant;
+use super::kernel::source;
+use super::{Bound, Gpu, Kernel, constant};
 use sapwise::error::GpuError;
 
 /// Most nodes of the highest level, which a walk tests one after the other.

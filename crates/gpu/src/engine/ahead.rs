@@ -2,8 +2,7 @@
 //! frame.
 
 use super::{Engine, Pending, Step};
-use crate::look::Look;
-use crate::params::{Header, Params};
+use crate::{Header, Look, Params};
 use bytemuck::bytes_of;
 use sapwise::error::{GpuError, GpuErrorKind};
 

@@ -1,10 +1,7 @@
 //! Waiting for a frame, downloading its pairs, and going on if one submission was not enough.
 
 use super::{Engine, Frame, PAIRS_AT, Pending, Step};
-use crate::failure::Failure;
-use crate::output::PAIR;
-use crate::params::{Header, Params};
-use crate::watch::Place;
+use crate::{Failure, Header, PAIR, Params, Place};
 use sapwise::Error;
 use sapwise::Pairs;
 use sapwise::error::GpuError;

@@ -1,10 +1,6 @@
 use super::{Engine, Pending};
-use crate::failure::Failure;
 use crate::kernel::dispatched;
-use crate::look::Look;
-use crate::output::Output;
-use crate::params::{Header, Params};
-use crate::{Gpus, first_for_tests};
+use crate::{Failure, Gpus, Header, Look, Output, Params, first_for_tests};
 use pollster::block_on;
 use sapwise::Aabb;
 use sapwise::algorithm::FramePlan;
