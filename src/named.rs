@@ -68,20 +68,20 @@ macro_rules! named {
             }
         }
 
-        $crate::named_in_files!($name);
+        $crate::text_in_files!($name);
         $crate::named_in_schemas!($name);
     };
 }
 
-/// Writes the names into files. A macro of its own, because a `cfg` in a macro asks for the features of the caller.
+/// Lets files hold the text of a type, which `Display` writes and `FromStr` reads. A macro of its own, because a `cfg` in a macro asks for the features of the caller.
 #[doc(hidden)]
 #[macro_export]
 #[cfg(feature = "serde")]
-macro_rules! named_in_files {
+macro_rules! text_in_files {
     ($name:ident) => {
         impl $crate::internals::serde::Serialize for $name {
             fn serialize<S: $crate::internals::serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-                serializer.serialize_str(self.as_str())
+                serializer.collect_str(self)
             }
         }
 
@@ -97,7 +97,7 @@ macro_rules! named_in_files {
 #[doc(hidden)]
 #[macro_export]
 #[cfg(not(feature = "serde"))]
-macro_rules! named_in_files {
+macro_rules! text_in_files {
     ($name:ident) => {};
 }
 
