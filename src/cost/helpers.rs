@@ -38,7 +38,8 @@ impl Helpers {
     #[must_use]
     pub fn cost_ns(&self, objects: u32, work_ns: f64) -> f64 {
         let Some(share) = self.share(objects) else { return work_ns };
-        share * self.call_ns + work_ns.min((work_ns + self.late_ns) / self.speed_up_of(share))
+        let speed_up = 1.0 + share * (self.speed_up - 1.0);
+        share * self.call_ns + work_ns.min((work_ns + self.late_ns) / speed_up)
     }
 
     /// Share of the helpers that a frame of `objects` boxes calls; `None` if it calls none.
@@ -48,11 +49,6 @@ impl Helpers {
         }
         let called = (objects / self.boxes_per_thread).min(self.threads).max(1) - 1;
         (called > 0).then(|| f64::from(called) / f64::from(self.threads - 1))
-    }
-
-    /// Speed-up over one thread if that share of the helpers is called.
-    fn speed_up_of(&self, share: f64) -> f64 {
-        1.0 + share * (self.speed_up - 1.0)
     }
 
     /// Whether its values are possible.

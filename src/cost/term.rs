@@ -70,22 +70,19 @@ impl Product {
 
     /// Whether its powers together are at most [`Self::MOST_POWERS`].
     pub(super) fn is_sound(&self) -> bool {
+        self.powers().into_iter().map(u32::from).sum::<u32>() <= Self::MOST_POWERS
+    }
+
+    fn powers(&self) -> [u8; 6] {
         let Self { objects, log2_objects, pairs, axis_candidates, strip_candidates, moved } = *self;
-        let powers = [objects, log2_objects, pairs, axis_candidates, strip_candidates, moved];
-        powers.into_iter().map(u32::from).sum::<u32>() <= Self::MOST_POWERS
+        [objects, log2_objects, pairs, axis_candidates, strip_candidates, moved]
     }
 
     fn of(&self, counts: &Counts<'_>) -> f64 {
-        let load = counts.load;
-        let factors = [
-            (counts.objects, self.objects),
-            (counts.log2_objects, self.log2_objects),
-            (load.pairs, self.pairs),
-            (load.axis_candidates, self.axis_candidates),
-            (load.strip_candidates, self.strip_candidates),
-            (load.moved, self.moved),
-        ];
-        factors.into_iter().map(|(figure, power)| figure.powi(i32::from(power))).product()
+        let Counts { load: Load { axis_candidates, strip_candidates, pairs, moved, .. }, objects, log2_objects } =
+            counts;
+        let figures = [objects, log2_objects, pairs, axis_candidates, strip_candidates, moved];
+        figures.into_iter().zip(self.powers()).map(|(figure, power)| figure.powi(i32::from(power))).product()
     }
 }
 
