@@ -22,7 +22,7 @@ const MOST_LN: f64 = 1000.0;
 const EXPONENT_LOG2: u32 = 4;
 
 /// Loads at which the residuals of all methods of a machine or a model are known.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 #[cfg_attr(
     feature = "serde",
     derive(serde::Serialize, serde::Deserialize),
@@ -37,17 +37,20 @@ pub struct Places {
     octaves: [f64; 2],
 }
 
-/// The residual of one method over the load.
+/// The correction of a cost over the load: what the terms leave unexplained, and what frames that ran showed.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct Residual {
     /// Loads at which it is known.
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub places: Arc<Places>,
-    /// Weight of the similarity to each of the first places, in the natural logarithm of a factor on the cost.
-    pub weights: Vec<f64>,
-    /// Natural logarithm of a factor that holds everywhere.
+    /// The logarithm of a factor that holds everywhere.
     pub constant: f64,
-    /// Whether similarity depends on how far boxes move.
+    /// The weight of each of the first `places`, as the logarithm of a factor.
+    pub weights: Vec<f64>,
+    /// Whether the correction depends on how far boxes move.
     pub by_motion: bool,
 }
 
@@ -141,7 +144,7 @@ impl Residual {
     /// Creates a residual with weights for the first places and no constant.
     #[must_use]
     pub fn new(places: Arc<Places>, weights: Vec<f64>, by_motion: bool) -> Self {
-        Self { places, weights, constant: 0.0, by_motion }
+        Self { places, constant: 0.0, weights, by_motion }
     }
 
     /// Sets the natural logarithm of a factor that holds everywhere.

@@ -80,21 +80,9 @@ struct CostFile {
     /// The effect of several threads; null for one thread and for GPUs.
     helpers: Option<Helpers>,
     /// Correction of the whole: on several threads by what the model leaves unexplained, later by frames that ran.
-    residual: Option<ResidualFile>,
+    residual: Option<Residual>,
     /// Standard deviation of the natural logarithm of measured over modelled time.
     spread_ln: f64,
-}
-
-/// The correction of a cost, on several threads and by frames that ran.
-#[derive(serde::Serialize, serde::Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(rename = "Residual", deny_unknown_fields))]
-struct ResidualFile {
-    /// The logarithm of a factor that holds everywhere.
-    constant: f64,
-    /// The weight of each of the first `places`, as the logarithm of a factor.
-    weights: Vec<f64>,
-    /// Whether the correction depends on how far boxes move.
-    by_motion: bool,
 }
 
 /// The works of a tuning, each once, and a fallback before the work that has it.
@@ -135,11 +123,7 @@ impl From<Tuning> for TuningFile {
             revision,
             work: works.position(&curve.work),
             helpers: curve.helpers,
-            residual: curve.residual.map(|Residual { constant, weights, by_motion, .. }| ResidualFile {
-                constant,
-                weights,
-                by_motion,
-            }),
+            residual: curve.residual,
             spread_ln,
         };
         let costs = tuning.costs.into_iter().map(cost).collect();
@@ -180,9 +164,7 @@ impl TryFrom<TuningFile> for Tuning {
         }
         let cost = |CostFile { algorithm, revision, work, helpers, residual, spread_ln }| {
             let Some(known) = works.get(work) else { return Err(TuningError::NoWork { algorithm, work }) };
-            let residual = residual.map(|ResidualFile { constant, weights, by_motion }| {
-                Residual::new(Arc::clone(&places), weights, by_motion).with_constant(constant)
-            });
+            let residual = residual.map(|own| Residual { places: Arc::clone(&places), ..own });
             let curve = CostCurve { work: Arc::clone(known), helpers, residual };
             Ok(AlgorithmCost { algorithm, revision, curve, spread_ln })
         };
