@@ -39,18 +39,14 @@ impl Active {
         self.slots.len()
     }
 
-    pub(super) fn push(&mut self, slot: u32, aabb: Aabb, body: &Body, patience: Patience) {
-        self.set_body(self.slots.len(), body);
-        self.slots.push(slot);
-        self.boxes.push(aabb);
-        self.patience.push(patience);
-    }
-
-    /// Puts another body in the place of one.
-    pub(super) fn replace(&mut self, at: usize, slot: u32, aabb: Aabb, body: &Body, patience: Patience) {
-        self.slots[at] = slot;
-        self.boxes[at] = aabb;
-        self.patience[at] = patience;
+    /// Puts a body in the place of another, or behind all others.
+    pub(super) fn put(&mut self, at: usize, slot: u32, aabb: Aabb, body: &Body, patience: Patience) {
+        if at == self.len() {
+            self.slots.push(slot);
+            self.boxes.push(aabb);
+            self.patience.push(patience);
+        }
+        (self.slots[at], self.boxes[at], self.patience[at]) = (slot, aabb, patience);
         self.set_body(at, body);
     }
 

@@ -63,9 +63,9 @@ impl Neighbours {
     ) {
         self.compact(actives);
         let Self { near, neighbours, waste } = self;
-        let epoch = resting.epoch();
+        let epoch = resting.epoch;
         let neighbour = |slot| Neighbour { aabb: boxes_at[slot as usize], slot };
-        let arrived: Vec<Neighbour> = resting.arrived().iter().take(FEW + 1).copied().map(neighbour).collect();
+        let arrived: Vec<Neighbour> = resting.arrived.iter().take(FEW + 1).copied().map(neighbour).collect();
         // Most slots are ruled out by a bit for each modulo 64.
         let bits = arrived.iter().fold(0_u64, |bits, one| bits | 1 << (one.slot % 64));
         let came =

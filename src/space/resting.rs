@@ -18,8 +18,8 @@ pub(super) struct Resting {
     tree: GrownTree,
     /// Bodies that came since the last update.
     arrivals: Vec<u32>,
-    /// Those that came in the last update.
-    arrived: Vec<u32>,
+    /// Those that came in the last update, when the epoch rose by 1.
+    pub(super) arrived: Vec<u32>,
     /// Whether the body in a slot is among those of the last update: one bit each, so that all stay in the cache.
     bits: Vec<u64>,
     /// Number of bodies without the arrivals.
@@ -28,7 +28,7 @@ pub(super) struct Resting {
     is_built: bool,
     /// Rises by 1 when bodies come to rest, by more when the bodies are others: what a query found before is no longer
     /// all.
-    epoch: u64,
+    pub(super) epoch: u64,
     wear: Wear,
     members: Vec<u32>,
 }
@@ -45,15 +45,6 @@ impl Resting {
     /// Returns the tree, whose ids are slots; `None` without a body.
     pub(super) fn tree(&self) -> Option<&Tree> {
         self.is_built.then_some(&self.tree.tree)
-    }
-
-    pub(super) fn epoch(&self) -> u64 {
-        self.epoch
-    }
-
-    /// Returns the bodies that came to rest when the epoch rose by 1.
-    pub(super) fn arrived(&self) -> &[u32] {
-        &self.arrived
     }
 
     /// Returns whether the body in a slot rests and did in the last update.

@@ -31,8 +31,6 @@ struct Slot {
     generation: u32,
     at: At,
     done: u8,
-    /// [`Body::rests_at_once`].
-    rests_at_once: bool,
 }
 
 /// See the module.
@@ -110,11 +108,6 @@ impl Slots {
         self.slots[slot as usize].done != 0
     }
 
-    /// Returns [`Body::rests_at_once`].
-    pub(super) fn rests_at_once(&self, slot: u32) -> bool {
-        self.slots[slot as usize].rests_at_once
-    }
-
     /// Inserts a body whose box is valid. There must be room.
     pub(super) fn insert(&mut self, aabb: Aabb, body: Body) -> Handle {
         let slot = self.free.pop().unwrap_or_else(|| self.push(1));
@@ -124,7 +117,7 @@ impl Slots {
 
     /// Adds a slot without a body.
     pub(super) fn push(&mut self, generation: u32) -> u32 {
-        self.slots.push(Slot { generation, at: At::Free, done: 0, rests_at_once: false });
+        self.slots.push(Slot { generation, at: At::Free, done: 0 });
         self.boxes.push(Aabb::default());
         self.bodies.push(Body::default());
         (self.boxes.len() - 1) as u32
@@ -151,7 +144,6 @@ impl Slots {
 
     pub(super) fn set_body(&mut self, slot: u32, body: Body) {
         self.bodies[slot as usize] = body;
-        self.slots[slot as usize].rests_at_once = body.rests_at_once();
         self.note(slot, SET_BODY);
     }
 
@@ -207,7 +199,7 @@ impl Slots {
         for slot in self.leaving.drain(..) {
             let of = &mut self.slots[slot as usize];
             // 0 is no generation.
-            *of = Slot { generation: of.generation.checked_add(1).unwrap_or(1), at: At::Free, done: 0, ..*of };
+            *of = Slot { generation: of.generation.checked_add(1).unwrap_or(1), at: At::Free, done: 0 };
             self.free.push(slot);
         }
     }

@@ -68,7 +68,7 @@ fn pairs_with_resting_bodies_stay_right_while_these_wake_move_and_rest_again() {
         }
         space.update().unwrap();
         together += usize::from(space.active.len() > 1 && space.resting.len() > 0);
-        woken += usize::from(!space.resting.arrived().is_empty());
+        woken += usize::from(!space.resting.arrived.is_empty());
         let slots: Vec<u32> = handles.iter().map(|handle| handle.slot()).collect();
         let mut right: Vec<(u32, u32)> = (0..boxes.len())
             .flat_map(|i| (0..i).map(move |j| (i, j)))

@@ -115,7 +115,7 @@ impl Space {
             if !removed {
                 // One that was set may be set again soon.
                 let wait = match at {
-                    At::New if self.slots.rests_at_once(slot) => 0,
+                    At::New if self.slots.body(slot).rests_at_once() => 0,
                     At::New => IDLE,
                     _ => 1,
                 };
@@ -137,10 +137,7 @@ impl Space {
         let at = place.unwrap_or(self.active.len() as u32);
         self.slots.set_at(slot, At::Active(at));
         let (aabb, body) = (self.slots.boxes()[slot as usize], self.slots.body(slot));
-        match place {
-            Some(at) => self.active.replace(at as usize, slot, aabb, body, patience),
-            None => self.active.push(slot, aabb, body, patience),
-        }
+        self.active.put(at as usize, slot, aabb, body, patience);
     }
 
     /// Removes the active body at a place.
