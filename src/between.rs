@@ -81,9 +81,7 @@ impl Between {
         if compares {
             workers.check(a)?;
             workers.check(b).map_err(of_b)?;
-            if columns.len() < workers.tasks() {
-                columns.resize_with(workers.tasks(), Columns::default);
-            }
+            columns.resize_with(columns.len().max(workers.tasks()), Columns::default);
             outputs.collect(workers, pairs, |lists| {
                 let parts = lists.len();
                 workers.try_each_of(lists.iter_mut().zip(columns).enumerate(), |(k, (list, columns))| {

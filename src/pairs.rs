@@ -177,7 +177,7 @@ impl Pairs {
         self.over = false;
         self.unwanted = 0;
         self.refused = None;
-        if let Some(screen) = self.filter.as_mut().filter(|screen| screen.is_stale()) {
+        if let Some(screen) = self.filter.as_mut().filter(|screen| screen.is_stale) {
             Arc::make_mut(screen).derive();
         }
     }
@@ -235,11 +235,9 @@ impl Pairs {
     /// [`Error::OutOfMemory`].
     pub fn reserve(&mut self, pairs: usize) -> Result<(), Error> {
         let wanted = self.limit.map_or(pairs, |l| pairs.min(l));
-        if wanted > self.buffer.len() {
-            let more = wanted - self.buffer.len();
-            if self.buffer.try_reserve_exact(more).is_err() {
-                return Err(Error::OutOfMemory { what: "pairs", elements: wanted });
-            }
+        if let Some(more) = wanted.checked_sub(self.buffer.len()) {
+            let refused = |_| Error::OutOfMemory { what: "pairs", elements: wanted };
+            self.buffer.try_reserve_exact(more).map_err(refused)?;
             self.buffer.resize(wanted, (0, 0));
         }
         Ok(())

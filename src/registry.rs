@@ -54,14 +54,11 @@ enum Maker {
     BuiltIn,
     /// The source of this type.
     Source(TypeId),
-    User(UsersMaker),
-}
-
-#[derive(Clone)]
-struct UsersMaker {
-    make: Factory,
-    /// Whether one instance runs on several numbers of threads.
-    is_family: bool,
+    /// `is_family`: one instance runs on several numbers of threads.
+    User {
+        make: Factory,
+        is_family: bool,
+    },
 }
 
 impl Registry {
@@ -100,8 +97,7 @@ impl Registry {
         revision: u32,
         factory: impl Fn() -> Result<Box<dyn BroadPhase>, Error> + Send + Sync + 'static,
     ) {
-        let make = Arc::new(move |_: &[u32]| factory());
-        self.set(Entry::new(id, revision), Maker::User(UsersMaker { make, is_family: false }));
+        self.set(Entry::new(id, revision), Maker::User { make: Arc::new(move |_| factory()), is_family: false });
     }
 
     /// Adds a user's [incremental](BroadPhase::is_incremental) algorithm that runs on any of these numbers of CPU
@@ -122,8 +118,7 @@ impl Registry {
         let ids = threads.iter().map(|&k| AlgorithmId::new(method, Backend::Cpu(k))).collect::<Result<Vec<_>, _>>()?;
         let factory: Factory = Arc::new(factory);
         for id in ids {
-            let maker = UsersMaker { make: Arc::clone(&factory), is_family: true };
-            self.set(Entry::new(id, revision), Maker::User(maker));
+            self.set(Entry::new(id, revision), Maker::User { make: Arc::clone(&factory), is_family: true });
         }
         Ok(())
     }
@@ -144,9 +139,9 @@ impl Registry {
     }
 
     /// Returns the maker of an algorithm that a user added; `None` if it is built in or a source's.
-    fn users_maker(&self, id: &AlgorithmId) -> Option<&UsersMaker> {
+    fn users_maker(&self, id: &AlgorithmId) -> Option<(&Factory, bool)> {
         match &self.makers[self.position(id)?] {
-            Maker::User(maker) => Some(maker),
+            Maker::User { make, is_family } => Some((make, *is_family)),
             _ => None,
         }
     }
@@ -305,8 +300,8 @@ impl Registry {
     /// [`Error::UnknownAlgorithm`]. [`Error::Unavailable`], for example if a file from a larger machine names more
     /// threads than this one has cores.
     pub fn create(&self, id: &AlgorithmId) -> Result<Box<dyn BroadPhase>, Error> {
-        if let Some(users) = self.users_maker(id) {
-            return (users.make)(&[id.threads()]);
+        if let Some((make, _)) = self.users_maker(id) {
+            return make(&[id.threads()]);
         }
         if let Some(method) = built_in(id) {
             return match self.unavailable(id.threads()) {
@@ -321,7 +316,7 @@ impl Registry {
     }
 
     fn make(&self, method: &Method, threads: &[u32]) -> Made {
-        method.create.make(threads, &self.threads, Simd::at_most(self.simd))
+        (method.create)(threads, &self.threads, Simd::at_most(self.simd))
     }
 
     /// Makes one instance for all of `ids`, which keeps its state when [`BroadPhase::set_threads`] changes the number
@@ -335,12 +330,12 @@ impl Registry {
         let mut threads: Vec<u32> = ids.iter().map(|id| id.threads()).collect();
         threads.sort_unstable();
         threads.dedup();
-        if let Some(users) = self.users_maker(first) {
-            let is_same = |other: &UsersMaker| other.is_family && Arc::ptr_eq(&other.make, &users.make);
+        if let Some((make, _)) = self.users_maker(first) {
+            let is_same = |(other, is_family): (&Factory, bool)| is_family && Arc::ptr_eq(other, make);
             let is_family = ids.iter().all(|id| self.users_maker(id).is_some_and(is_same));
-            return is_family.then(|| (users.make)(&threads)).transpose();
+            return is_family.then(|| make(&threads)).transpose();
         }
-        let Some(method) = built_in(first).filter(|method| method.create.is_family()) else { return Ok(None) };
+        let Some(method) = built_in(first).filter(|method| method.is_family) else { return Ok(None) };
         let is_built_in = |id: &&AlgorithmId| {
             built_in(id).is_some_and(|other| other.name == method.name)
                 && self.users_maker(id).is_none()

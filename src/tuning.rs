@@ -189,7 +189,7 @@ impl Tuning {
         loads: &[Load],
         spread: impl Fn(usize, usize, &Load) -> f64,
     ) -> Self {
-        let slice = Slice::new(loads);
+        let slice = Slice(loads);
         let fields = slice.steps(&costs);
         let crossovers = fields.windows(2).map(|two| {
             let (below, (from, above)) = (two[0].1, two[1]);

@@ -71,9 +71,7 @@ impl Worlds {
         workers.check(boxes)?;
         reserve(offsets, starts.len(), "offsets of worlds")?;
         offsets.resize(starts.len(), 0);
-        if searches.len() < workers.tasks() {
-            searches.resize_with(workers.tasks(), || WorldSearch::new(*simd));
-        }
+        searches.resize_with(searches.len().max(workers.tasks()), || WorldSearch::new(*simd));
         let found = outputs.collect(workers, pairs, |lists| find(workers, boxes, starts, searches, offsets, lists));
         let found = found.and_then(|()| pairs.finish_on(workers));
         if found.is_err() {

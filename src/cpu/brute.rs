@@ -1,7 +1,7 @@
 //! Tests each of the n (n - 1) / 2 pairs on three axes, as in the paper.
 
 use crate::broad_phase::check_count;
-use crate::cpu::{Columns, Outputs, Simd, Threads, Workers, brute_rows, ensure};
+use crate::cpu::{Columns, Made, Outputs, Simd, Threads, Workers, brute_rows, ensure};
 use crate::filter::Screen;
 use crate::{Aabb, BroadPhase, Error, Pairs};
 
@@ -22,8 +22,8 @@ struct Brute {
     simd: Simd,
 }
 
-pub(super) fn create(threads: u32, pools: &Threads, simd: Simd) -> Result<Box<dyn BroadPhase>, Error> {
-    let workers = Workers::new("brute", threads, pools);
+pub(super) fn create(threads: &[u32], pools: &Threads, simd: Simd) -> Made {
+    let workers = Workers::new("brute", threads[0], pools);
     let (columns, outputs) = (Columns::default(), Outputs::default());
     Ok(Box::new(Brute { workers, order: Vec::new(), columns, outputs, simd }))
 }

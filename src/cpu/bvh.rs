@@ -4,7 +4,7 @@
 //! [`tree`](super::tree).
 
 use crate::broad_phase::check_count;
-use crate::cpu::{Outputs, Simd, Threads, Tree, Upkeep, Workers};
+use crate::cpu::{Made, Outputs, Simd, Threads, Tree, Upkeep, Workers};
 use crate::load::FramePlan;
 use crate::{Aabb, BroadPhase, Error, Pairs};
 
@@ -17,8 +17,8 @@ struct Bvh {
     outputs: Outputs,
 }
 
-pub(super) fn create(threads: u32, pools: &Threads, simd: Simd) -> Result<Box<dyn BroadPhase>, Error> {
-    let workers = Workers::new("bvh", threads, pools);
+pub(super) fn create(threads: &[u32], pools: &Threads, simd: Simd) -> Made {
+    let workers = Workers::new("bvh", threads[0], pools);
     Ok(Box::new(Bvh {
         workers,
         tree: Tree::new(simd),

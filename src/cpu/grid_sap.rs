@@ -20,8 +20,8 @@
 
 use crate::broad_phase::check_count;
 use crate::cpu::{
-    Columns, Group, Input, LANES, Members, Outputs, Simd, Threads, Tree, Workers, ensure, order_key, part, reserve,
-    sweep_rows,
+    Columns, Group, Input, LANES, Made, Members, Outputs, Simd, Threads, Tree, Workers, ensure, order_key, part,
+    reserve, sweep_rows,
 };
 use crate::load::{FramePlan, SceneStats, StripGrid, StripSpan};
 use crate::{Aabb, BroadPhase, Error, Pairs};
@@ -83,8 +83,8 @@ struct Task {
     columns: Columns,
 }
 
-pub(super) fn create(threads: u32, pools: &Threads, simd: Simd) -> Result<Box<dyn BroadPhase>, Error> {
-    let workers = Workers::new("grid-sap", threads, pools);
+pub(super) fn create(threads: &[u32], pools: &Threads, simd: Simd) -> Made {
+    let workers = Workers::new("grid-sap", threads[0], pools);
     Ok(Box::new(GridSap {
         bins: (0..workers.threads()).map(|_| Bins::default()).collect(),
         apart: Vec::new(),

@@ -50,41 +50,21 @@ pub(crate) struct Method {
     pub(crate) name: &'static str,
     /// Rises when its speed changes.
     pub(crate) revision: u32,
-    pub(crate) create: Create,
+    /// Makes an instance at a SIMD level for these numbers of threads, ascending: one number unless it is a family.
+    pub(crate) create: fn(&[u32], &Threads, Simd) -> Made,
+    /// Whether it is incremental, and one instance runs on any of its numbers of threads and keeps its state when they
+    /// change. It begins with the least.
+    pub(crate) is_family: bool,
 }
 
 /// An instance of a method.
 pub(crate) type Made = Result<Box<dyn BroadPhase>, Error>;
 
-/// Makes an instance at a SIMD level.
-pub(crate) enum Create {
-    /// It runs on that many threads.
-    OneWidth(fn(u32, &Threads, Simd) -> Made),
-    /// It is incremental, runs on any of these numbers of threads, ascending, and keeps its state when they change. It
-    /// begins with the least.
-    AnyWidth(fn(&[u32], &Threads, Simd) -> Made),
-}
-
-impl Create {
-    /// Makes an instance for these numbers of threads, ascending: one number unless it [`is_family`](Self::is_family).
-    pub(crate) fn make(&self, threads: &[u32], pools: &Threads, simd: Simd) -> Made {
-        match self {
-            Self::OneWidth(create) => create(threads[0], pools, simd),
-            Self::AnyWidth(create) => create(threads, pools, simd),
-        }
-    }
-
-    /// Returns whether one instance runs on several numbers of threads.
-    pub(crate) fn is_family(&self) -> bool {
-        matches!(self, Self::AnyWidth(_))
-    }
-}
-
 /// Every method, the simplest first.
 pub(crate) const METHODS: &[Method] = &[
-    Method { name: "brute", revision: 4, create: Create::OneWidth(brute::create) },
-    Method { name: "sap", revision: 4, create: Create::OneWidth(sap::create) },
-    Method { name: "grid-sap", revision: 4, create: Create::OneWidth(grid_sap::create) },
-    Method { name: "bvh", revision: 2, create: Create::OneWidth(bvh::create) },
-    Method { name: "pair-cache", revision: 4, create: Create::AnyWidth(pair_cache::create) },
+    Method { name: "brute", revision: 4, create: brute::create, is_family: false },
+    Method { name: "sap", revision: 4, create: sap::create, is_family: false },
+    Method { name: "grid-sap", revision: 4, create: grid_sap::create, is_family: false },
+    Method { name: "bvh", revision: 2, create: bvh::create, is_family: false },
+    Method { name: "pair-cache", revision: 4, create: pair_cache::create, is_family: true },
 ];

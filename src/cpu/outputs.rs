@@ -21,9 +21,7 @@ impl Outputs {
     /// Returns one list for each task of `workers`, empty and under the caller's limit and filter. Lists of more tasks
     /// stay for later frames.
     fn ready(&mut self, workers: &Workers, pairs: &Pairs) -> &mut [Pairs] {
-        if self.lists.len() < workers.tasks() {
-            self.lists.resize_with(workers.tasks(), Pairs::new);
-        }
+        self.lists.resize_with(self.lists.len().max(workers.tasks()), Pairs::new);
         let lists = &mut self.lists[..workers.tasks()];
         self.any_over.store(false, Relaxed);
         lists.iter_mut().for_each(|list| list.begin_part(pairs, &self.any_over));

@@ -3,7 +3,7 @@
 //! The paper sweeps along the axis of greatest variance, which a few boxes far away decide.
 
 use crate::broad_phase::check_count;
-use crate::cpu::{Columns, Outputs, Simd, Threads, Workers, ensure, order_key, part, sort, sweep_rows};
+use crate::cpu::{Columns, Made, Outputs, Simd, Threads, Workers, ensure, order_key, part, sort, sweep_rows};
 use crate::load::FramePlan;
 use crate::{Aabb, BroadPhase, Error, Pairs};
 
@@ -19,8 +19,8 @@ struct Sap {
     simd: Simd,
 }
 
-pub(super) fn create(threads: u32, pools: &Threads, simd: Simd) -> Result<Box<dyn BroadPhase>, Error> {
-    let workers = Workers::new("sap", threads, pools);
+pub(super) fn create(threads: &[u32], pools: &Threads, simd: Simd) -> Made {
+    let workers = Workers::new("sap", threads[0], pools);
     let (columns, outputs) = (Columns::default(), Outputs::default());
     Ok(Box::new(Sap { workers, keys: Vec::new(), scratch: Vec::new(), columns, outputs, simd }))
 }

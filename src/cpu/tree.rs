@@ -160,13 +160,13 @@ impl Tree {
         input.workers.map(&sorted[..split], &mut before[..split], of);
         input.workers.map(&sorted[split..], behind, of);
         ids[*in_use..].fill(NOBODY);
-        sweeps.begin(order.shapes().iter().map(|(long, at)| {
+        sweeps.begin(order.shapes.iter().map(|(long, at)| {
             let by = if at.start < split { 0 } else { passive_from - split };
             Kind { long: *long, leaves: (at.start + by).div_ceil(LANES)..(at.end + by) / LANES }
         }));
         self.fill(input, |_, _| true);
         self.leaves.clear();
-        self.leaves.extend(self.order.starts().iter().copied().zip(0..));
+        self.leaves.extend(self.order.starts.iter().copied().zip(0..));
         (self.curve, self.renewal) = (Some(curve), None);
         self.mark(input)
     }
@@ -285,7 +285,7 @@ impl Tree {
     /// Writes the memberships of all boxes to the leaves, and their unions to the nodes above.
     fn mark(&mut self, Input { workers, screen, .. }: Input<'_>) -> Result<(), Error> {
         let Self { ids, levels, marks, .. } = self;
-        let Some(screen) = screen.filter(|screen| screen.is_partial()) else {
+        let Some(screen) = screen.filter(|screen| screen.is_partial) else {
             marks.clear();
             return Ok(());
         };
@@ -338,7 +338,7 @@ impl Tree {
 
     fn walk(&self) -> Walk<'_> {
         let marks = Some(&self.marks[..]).filter(|marks| !marks.is_empty());
-        Walk { levels: &self.levels, ids: &self.ids, far: self.ids.len() > FAR, apart: self.sweeps.apart(), marks }
+        Walk { levels: &self.levels, ids: &self.ids, far: self.ids.len() > FAR, apart: &self.sweeps.apart, marks }
     }
 
     /// Sorts boxes that are not in the tree along its curve. Until it is built again, [`others`](Self::others) returns
@@ -371,9 +371,8 @@ fn is_sparse(places: usize, boxes: usize) -> bool {
     places as f64 > MOST_PLACES * boxes as f64 + 64.0
 }
 
-/// Makes room for this many places and for the nodes above them, with unspecified content. Returns the number of
-/// levels.
-fn lay_out(levels: &mut Vec<Vec<Node>>, ids: &mut Vec<u32>, places: usize) -> Result<usize, Error> {
+/// Makes room for this many places and for the nodes above them, with unspecified content.
+fn lay_out(levels: &mut Vec<Vec<Node>>, ids: &mut Vec<u32>, places: usize) -> Result<(), Error> {
     let mut nodes = places.div_ceil(LANES);
     ids.truncate(nodes * LANES);
     grow(ids, nodes * LANES, NOBODY)?;
@@ -392,7 +391,7 @@ fn lay_out(levels: &mut Vec<Vec<Node>>, ids: &mut Vec<u32>, places: usize) -> Re
     }
     // Levels of a larger tree keep their memory.
     levels[level + 1..].iter_mut().for_each(Vec::clear);
-    Ok(level + 1)
+    Ok(())
 }
 
 /// Adds empty elements to a list until it has at least this many.

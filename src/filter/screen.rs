@@ -15,9 +15,9 @@ pub(crate) struct Screen {
     /// 1 for each passive box. May be shorter than the input.
     passive: Vec<u8>,
     /// Whether two boxes that are not both passive may be unwanted as a pair.
-    is_partial: bool,
+    pub(crate) is_partial: bool,
     /// Whether the filter may have changed since the rest was derived.
-    stale: bool,
+    pub(crate) is_stale: bool,
 }
 
 /// The different memberships, owners aside, and the number of boxes of each.
@@ -31,21 +31,17 @@ struct Classes {
 
 impl Screen {
     pub(crate) fn new(filter: Filter) -> Self {
-        let mut screen = Self { filter, passive: Vec::new(), is_partial: true, stale: true };
+        let mut screen = Self { filter, passive: Vec::new(), is_partial: true, is_stale: true };
         screen.derive();
         screen
     }
 
     /// Returns the filter for changes. No box is passive until the next [`derive`](Self::derive).
     pub(crate) fn filter_mut(&mut self) -> &mut Filter {
-        self.stale = true;
+        self.is_stale = true;
         self.passive.clear();
         self.is_partial = true;
         &mut self.filter
-    }
-
-    pub(crate) fn is_stale(&self) -> bool {
-        self.stale
     }
 
     /// Returns whether a box is passive.
@@ -54,16 +50,11 @@ impl Screen {
         self.passive.get(id) == Some(&1)
     }
 
-    /// Returns whether two boxes that are not both passive may be unwanted as a pair.
-    pub(crate) fn is_partial(&self) -> bool {
-        self.is_partial
-    }
-
     /// Finds the passive boxes: of the memberships of which no two boxes are wanted, the most frequent one, then each
     /// next one of which no box is wanted with a passive one. If memberships are many, the fixed boxes are passive.
     pub(crate) fn derive(&mut self) {
-        let Self { filter: Filter { memberships }, passive, is_partial, stale } = self;
-        *stale = false;
+        let Self { filter: Filter { memberships }, passive, is_partial, is_stale } = self;
+        *is_stale = false;
         *is_partial = true;
         passive.clear();
         // Without memory no box is passive.
@@ -142,9 +133,9 @@ mod tests {
     fn passive(memberships: &[Membership]) -> (Vec<bool>, bool) {
         let mut screen = Screen::new(Filter::default());
         *screen.filter_mut() = Filter::new(memberships.to_vec());
-        assert!(screen.is_stale() && (0..memberships.len()).all(|k| !screen.is_passive(k)));
+        assert!(screen.is_stale && (0..memberships.len()).all(|k| !screen.is_passive(k)));
         screen.derive();
-        ((0..memberships.len() + 2).map(|k| screen.is_passive(k)).collect(), screen.is_partial())
+        ((0..memberships.len() + 2).map(|k| screen.is_passive(k)).collect(), screen.is_partial)
     }
 
     #[test]

@@ -14,8 +14,9 @@ const CLAMP: f64 = 1.0e30;
 /// Statistics of a frame: ranks and counts, which a few boxes anywhere in space don't change.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct SceneStats {
-    /// Start and length of the range in which most centres lie, on each axis.
-    ranges: [(f64, f64); 3],
+    /// Start and length of the range in which most centres lie, on each axis: the cells of a grid share it, and those at
+    /// the ends take the boxes beyond.
+    pub ranges: [(f64, f64); 3],
     /// The 0.9 quantile of the extents on each axis.
     pub extent: [f64; 3],
     /// Share of all pairs that overlap on each axis.
@@ -31,12 +32,6 @@ impl SceneStats {
     /// Estimates the statistics of the boxes at these positions.
     pub fn of_members(boxes: &[Aabb], members: &[u32]) -> Self {
         Self::of_sample(&SampledBoxes::among(members.len(), |k| &boxes[members[k] as usize]))
-    }
-
-    /// Returns start and length of the range that cells of a grid on this axis share: that of most boxes. The cells at
-    /// the ends take the boxes beyond.
-    pub fn range(&self, axis: usize) -> (f64, f64) {
-        self.ranges[axis]
     }
 
     /// Returns the axis on which the fewest pairs overlap: a sweep along it has the fewest candidates.
@@ -106,9 +101,9 @@ mod tests {
         assert_eq!((stats.sweep_axis(), stats.extent, stats.shares), (1, [1.0; 3], [1.0, 0.0, 1.0]));
         let sample = SampledBoxes::from(&boxes);
         assert_eq!(sample.share_of_pairs(|b| [(b.min[0], b.max[0]), (b.min[2], b.max[2])]), 1.0);
-        let (low, length) = stats.range(1);
+        let (low, length) = stats.ranges[1];
         assert!(low.abs() < 600.0 && (length - 10_000.0).abs() < 900.0, "{low} {length}");
-        assert_eq!(stats.range(0), (0.0, 0.0));
+        assert_eq!(stats.ranges[0], (0.0, 0.0));
     }
 
     #[test]
@@ -123,7 +118,7 @@ mod tests {
             let stats = SceneStats::of(&scene(far));
             assert_eq!(stats.sweep_axis(), 0, "{far}");
             for (axis, length) in [1000.0, 100.0, 100.0].into_iter().enumerate() {
-                let (low, range) = stats.range(axis);
+                let (low, range) = stats.ranges[axis];
                 assert!(low > -0.2 * length && range > 0.8 * length && range < 1.2 * length, "{far}: {low} {range}");
             }
         }

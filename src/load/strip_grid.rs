@@ -26,7 +26,8 @@ pub struct StripGrid {
     across: [usize; 2],
     origin: [f32; 2],
     inverse_width: [f32; 2],
-    cells: [u32; 2],
+    /// The number of cells on the two grid axes.
+    pub cells: [u32; 2],
     /// The number of the last cell on each grid axis.
     last: [f32; 2],
     /// Extents above which a box is oversized: on the sweep axis, then on the grid axes.
@@ -50,7 +51,7 @@ impl StripGrid {
     pub fn plan(stats: &SceneStats, objects: usize) -> Self {
         let axis = stats.sweep_axis();
         let across = [(axis + 1) % 3, (axis + 2) % 3];
-        let range = across.map(|a| stats.range(a));
+        let range = across.map(|a| stats.ranges[a]);
         let wanted = (objects as f64 / BOXES_PER_STRIP).max(1.0);
         // 1 for NaN too, of a world without length.
         let held = |cells: f64, most: f64| cells.max(1.0).min(most);
@@ -75,11 +76,6 @@ impl StripGrid {
         }
         grid.large[0] = if grid.strips() > 1 { (LARGE_LENGTHS * stats.extent[axis]) as f32 } else { f32::INFINITY };
         grid
-    }
-
-    /// Returns the number of cells on the two grid axes.
-    pub fn cells(&self) -> [u32; 2] {
-        self.cells
     }
 
     /// Returns the number of strips.

@@ -237,11 +237,7 @@ impl Pairs {
         }
         // By a quarter: the memory matters more than the copies of the first frames.
         let wanted = (self.buffer.len() + self.buffer.len() / 4).max(self.len + more).max(64).min(limit);
-        if self.buffer.try_reserve_exact(wanted - self.buffer.len()).is_err() {
-            self.refused = Some(wanted);
-            return false;
-        }
-        self.buffer.resize(wanted, (0, 0));
-        true
+        self.refused = self.reserve(wanted).err().map(|_| wanted);
+        self.refused.is_none()
     }
 }

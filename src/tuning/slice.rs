@@ -18,35 +18,29 @@ const HALVINGS: u32 = 8;
 
 /// Loads, ascending by objects, and everything between them on logarithmic axes. A place is the number of a load and
 /// the share of the way to the next.
-pub(super) struct Slice<'a> {
-    loads: &'a [Load],
-}
+pub(super) struct Slice<'a>(pub(super) &'a [Load]);
 
-impl<'a> Slice<'a> {
-    pub(super) fn new(loads: &'a [Load]) -> Self {
-        Self { loads }
-    }
-
+impl Slice<'_> {
     fn last(&self) -> f64 {
-        self.loads.len().saturating_sub(1) as f64
+        self.0.len().saturating_sub(1) as f64
     }
 
     fn load(&self, place: f64) -> Load {
-        let below = (place.max(0.0) as usize).min(self.loads.len() - 1);
+        let below = (place.max(0.0) as usize).min(self.0.len() - 1);
         let share = place - below as f64;
-        match self.loads.get(below + 1) {
-            Some(above) if share > 0.0 => between(&self.loads[below], above, share),
-            _ => self.loads[below],
+        match self.0.get(below + 1) {
+            Some(above) if share > 0.0 => between(&self.0[below], above, share),
+            _ => self.0[below],
         }
     }
 
     /// The place of a number of objects, or the nearer end.
     fn place(&self, objects: f64) -> f64 {
-        let above = self.loads.partition_point(|l| f64::from(l.objects) <= objects);
-        let (Some(below), Some(b)) = (above.checked_sub(1), self.loads.get(above)) else {
+        let above = self.0.partition_point(|l| f64::from(l.objects) <= objects);
+        let (Some(below), Some(b)) = (above.checked_sub(1), self.0.get(above)) else {
             return if above == 0 { 0.0 } else { self.last() };
         };
-        let [a, x, b] = [f64::from(self.loads[below].objects), objects, f64::from(b.objects)].map(|n| (n + 1.0).ln());
+        let [a, x, b] = [f64::from(self.0[below].objects), objects, f64::from(b.objects)].map(|n| (n + 1.0).ln());
         below as f64 + (x - a) / (b - a)
     }
 
@@ -76,7 +70,7 @@ impl<'a> Slice<'a> {
     /// of the slice. An algorithm keeps its field while it is within [`SAME`] of the cheapest.
     pub(super) fn steps(&self, costs: &[AlgorithmCost]) -> Vec<(Load, usize)> {
         let mut steps = Vec::new();
-        let Some(first) = self.loads.first() else { return steps };
+        let Some(first) = self.0.first() else { return steps };
         let Some((cheapest_here, least)) = cheapest(costs, first, |_| true) else { return steps };
         // Of those that cost about the same the first, which has the fewest threads.
         let holds = |best: usize, other: usize, load: &Load, least: f64| {
@@ -88,8 +82,8 @@ impl<'a> Slice<'a> {
         steps.push((*first, best));
         // Places since the last step, all of which belong to its algorithm.
         let mut held = vec![(0.0, *first)];
-        for k in 1..self.loads.len() {
-            let ln = (f64::from(self.loads[k].objects) / f64::from(self.loads[k - 1].objects.max(1))).ln();
+        for k in 1..self.0.len() {
+            let ln = (f64::from(self.0[k].objects) / f64::from(self.0[k - 1].objects.max(1))).ln();
             let parts = (ln / FINEST_LN).ceil().max(1.0) as u32;
             for part in 1..=parts {
                 let place = (k - 1) as f64 + f64::from(part) / f64::from(parts);
@@ -192,7 +186,7 @@ mod tests {
         let mut borders = 0;
         for seed in 0..40 {
             let (costs, loads) = drawn(seed);
-            let slice = Slice::new(&loads);
+            let slice = Slice(&loads);
             let steps = slice.steps(&costs);
             let at = |n: u32| steps[..steps.partition_point(|s| s.0.objects <= n)].last().unwrap().1;
             let mut place = 0.0;
@@ -224,7 +218,7 @@ mod tests {
         };
         let loads = [10, 1000].map(Load::of_objects);
         let first = |costs: &[AlgorithmCost]| {
-            let steps = Slice::new(&loads).steps(costs);
+            let steps = Slice(&loads).steps(costs);
             assert_eq!(steps.len(), 1);
             costs[steps[0].1].algorithm.to_string()
         };
@@ -236,7 +230,7 @@ mod tests {
     #[test]
     fn reach_ends_at_its_condition_or_at_the_end() {
         let loads: Vec<Load> = (1..=20).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
-        let slice = Slice::new(&loads);
+        let slice = Slice(&loads);
         let from =
             |objects: f64, upwards, limit: u32| slice.reach(objects, upwards, |l| (l.objects > limit) == upwards);
         assert!((from(1000.0, true, 5000) / 5000.0 - 1.0).abs() < 0.01);

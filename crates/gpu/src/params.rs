@@ -104,7 +104,7 @@ impl Params {
         let turned = [axis, (axis + 1) % 3, (axis + 2) % 3];
         let longest = look.sample.extent.iter().copied().fold(0.0, f64::max);
         // If most boxes are points, the usual extent is a small part of the world.
-        let world = (0..3).map(|a| look.sample.range(a).1).fold(0.0, f64::max) / f64::from(objects.max(1)).cbrt();
+        let world = look.sample.ranges.map(|r| r.1).into_iter().fold(0.0, f64::max) / f64::from(objects.max(1)).cbrt();
         let usual = (1.0 / longest.max(world / 8.0)) as f32;
         let curve =
             turned.map(|a| look.parts[a].divide(|width, share| curve_cells(width, share, look.sample.extent[a])));
@@ -143,7 +143,7 @@ impl Params {
             look.parts[axis]
                 .divide(|width, share| (share * f64::from(cells)).round().min(width / (2.0 * sample.extent[axis])))
         };
-        let [cells_u, cells_v] = plan.cells();
+        let [cells_u, cells_v] = plan.cells;
         let (across_u, across_v) = (across(u, cells_u), across(v, cells_v));
         let strips = f64::from(across_u.cells) * f64::from(across_v.cells);
         let wanted = (f64::from(objects) / strips).ceil().min((MOST_SLOTS / strips).floor());

@@ -88,8 +88,8 @@ impl Cells {
 impl Curve {
     /// Makes a curve for this many boxes through the range of most of them.
     pub(super) fn over(stats: &SceneStats, boxes: usize) -> Self {
-        let range = [0, 1, 2].map(|a| stats.range(a));
-        Self::through(range.map(|r| r.0 as f32), range.map(|r| r.1 as f32), stats.extent.map(|e| e as f32), boxes)
+        let ranges = stats.ranges;
+        Self::through(ranges.map(|r| r.0 as f32), ranges.map(|r| r.1 as f32), stats.extent.map(|e| e as f32), boxes)
     }
 
     /// Makes a curve through a dense cell. `None` if all centres are the same.

@@ -24,11 +24,11 @@ pub(super) struct Order {
     keys: Vec<u64>,
     len: usize,
     scratch: Vec<u64>,
-    /// Where the boxes of each shape stand, active ones first: the axes on which they are oversized, one bit
-    /// each, and their places in the order.
-    shapes: Vec<(u32, Range<usize>)>,
-    /// Code of the first active box of each leaf.
-    starts: Vec<u32>,
+    /// Where the boxes of each shape stand that were [sorted](Self::sort), active ones first: the axes on which they are
+    /// oversized, one bit each, and their places in the order.
+    pub(super) shapes: Vec<(u32, Range<usize>)>,
+    /// Code of the first active box of each leaf, ascending.
+    pub(super) starts: Vec<u32>,
     /// Dense cells that are not sorted yet: the large ones, and the others.
     large: Vec<Range<usize>>,
     small: Vec<Range<usize>>,
@@ -45,16 +45,6 @@ impl Order {
     /// Returns the sorted boxes: their positions are in the lower halves.
     pub(super) fn ids(&self) -> &[u64] {
         &self.keys[..self.len]
-    }
-
-    /// Returns the code of the first active box of each leaf, ascending.
-    pub(super) fn starts(&self) -> &[u32] {
-        &self.starts
-    }
-
-    /// Returns where the boxes of each shape stand that were [sorted](Self::sort).
-    pub(super) fn shapes(&self) -> &[(u32, Range<usize>)] {
-        &self.shapes
     }
 
     /// Sorts the boxes at these positions by lower bound on an axis. The lower halves of the keys are places in

@@ -31,8 +31,8 @@ pub(super) struct Sweeps {
     sorted: Vec<Tree>,
     /// Two of these for each sweep.
     swept: Vec<[usize; 2]>,
-    /// The same pairs of kinds in the tree.
-    apart: Vec<Apart>,
+    /// The same pairs of kinds in the tree: leaves that need not be compared.
+    pub(super) apart: Vec<Apart>,
 }
 
 impl Sweeps {
@@ -40,11 +40,6 @@ impl Sweeps {
     pub(super) fn begin(&mut self, kinds: impl Iterator<Item = Kind>) {
         self.kinds.clear();
         self.kinds.extend(kinds.filter(|kind| !kind.leaves.is_empty()));
-    }
-
-    /// Returns the leaves of the tree that need not be compared.
-    pub(super) fn apart(&self) -> &[Apart] {
-        &self.apart
     }
 
     /// Chooses the kinds whose pairs are cheaper to find here than with the tree, which has these boxes now.
@@ -180,7 +175,7 @@ mod tests {
     fn pairs_of_long_boxes_are_right_in_every_frame_of_churn() {
         const FRAMES: u64 = 36;
         let workers = workers();
-        let mut oracle = crate::cpu::brute::create(1, &Threads::default(), Simd::Portable).unwrap();
+        let mut oracle = crate::cpu::brute::create(&[1], &Threads::default(), Simd::Portable).unwrap();
         let mut trees: Vec<_> = Simd::every().map(|simd| (Tree::new(simd), Upkeep::new(false))).collect();
         let mut random = 0;
         let mut below = |n: usize| {

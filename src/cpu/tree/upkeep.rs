@@ -109,7 +109,7 @@ impl Upkeep {
         tree.build(workers, boxes, Members::From(0), &stats, screen)?;
         #[cfg(test)]
         (self.builds += 1);
-        let longest = (0..3).map(|a| stats.range(a).1).fold(0.0, f64::max) as f32;
+        let longest = stats.ranges.map(|r| r.1).into_iter().fold(0.0, f64::max) as f32;
         let area = tree.half_area(longest) / boxes.len().max(1) as f64;
         self.tree = Some(Known { boxes: boxes.len(), area, longest, excess: 0.0, sum: 0.0 });
         let build = each_ns(started, boxes.len());
