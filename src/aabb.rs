@@ -37,19 +37,16 @@ pub struct Aabb {
 
 impl Aabb {
     /// Makes a box from its corners without a check: every [`BroadPhase`](crate::BroadPhase) checks its input.
-    #[must_use]
     pub const fn new(min: [f32; 3], max: [f32; 3]) -> Self {
         Self { min, max }
     }
 
     /// Makes the cube of half edge `half` around `centre`.
-    #[must_use]
     pub fn cube(centre: [f32; 3], half: f32) -> Self {
         Self { min: centre.map(|c| c - half), max: centre.map(|c| c + half) }
     }
 
     /// Makes a box in two dimensions: from 0 to 0 on z.
-    #[must_use]
     pub const fn flat(min: [f32; 2], max: [f32; 2]) -> Self {
         Self { min: [min[0], min[1], 0.0], max: [max[0], max[1], 0.0] }
     }
@@ -65,7 +62,6 @@ impl Aabb {
     /// assert!(f64::from(b.min[0]) < 0.1 && f64::from(b.max[0]) > 0.1);
     /// assert_eq!((b.min[1], b.max[1]), (f32::NEG_INFINITY, 0.5));
     /// ```
-    #[must_use]
     pub fn from_f64(min: [f64; 3], max: [f64; 3]) -> Self {
         // A comparison with NaN is false.
         let down = |v: f64| if f64::from(v as f32) > v { (v as f32).next_down() } else { v as f32 };
@@ -107,7 +103,6 @@ impl Aabb {
 
     /// Returns whether two boxes share a point, boundaries included.
     #[inline]
-    #[must_use]
     pub fn overlaps(&self, other: &Self) -> bool {
         (0..3).all(|a| self.min[a] <= other.max[a] && other.min[a] <= self.max[a])
     }
@@ -121,7 +116,6 @@ impl Aabb {
 
     /// Returns why this box is invalid, or `None` if it is valid.
     #[inline]
-    #[must_use]
     pub fn defect(&self) -> Option<BoxDefect> {
         // One comparison for each axis is false for NaN and for inverted bounds.
         if (0..3).all(|a| self.min[a] <= self.max[a]) {

@@ -97,19 +97,16 @@ impl AlgorithmId {
     }
 
     /// Returns the part before the `@`.
-    #[must_use]
     pub fn method(&self) -> &str {
         &self.method
     }
 
     /// Returns the part after the `@`.
-    #[must_use]
     pub fn backend(&self) -> &Backend {
         &self.backend
     }
 
     /// Returns the number of CPU threads that the algorithm keeps busy: one for GPUs.
-    #[must_use]
     pub fn threads(&self) -> u32 {
         match self.backend {
             Backend::Cpu(k) => k,
@@ -120,7 +117,6 @@ impl AlgorithmId {
 
 impl Backend {
     /// Returns the class of the processor.
-    #[must_use]
     pub fn class(&self) -> BackendClass {
         match self {
             Self::Cpu(_) => BackendClass::Cpu,
@@ -129,7 +125,6 @@ impl Backend {
     }
 
     /// Returns the number of CPU threads, or of GPUs.
-    #[must_use]
     pub fn width(&self) -> u32 {
         match self {
             Self::Cpu(threads) => *threads,

@@ -44,7 +44,6 @@ pub struct Between {
 impl Between {
     /// Makes a search on as many threads as algorithms of this registry may have. One with
     /// [`Registry::with_cores(1)`](Registry::with_cores) runs on the calling thread alone.
-    #[must_use]
     pub fn new(registry: &Registry) -> Self {
         let simd = Simd::at_most(registry.simd());
         Self {

@@ -128,7 +128,6 @@ pub struct FrameWork {
 
 impl FrameWork {
     /// Makes the work of a frame. `over_mean` counts as 1 unless it is a positive number.
-    #[must_use]
     pub fn new(kind: FrameKind, over_mean: f64) -> Self {
         Self { kind, over_mean: if over_mean.is_finite() && over_mean > 0.0 { over_mean } else { 1.0 } }
     }

@@ -49,7 +49,6 @@ pub struct Changes<Id = u32> {
 
 impl<Id: Copy + Ord> Changes<Id> {
     /// Makes a list without pairs: all pairs of the first update begin.
-    #[must_use]
     pub fn new() -> Self {
         Self {
             ids: Vec::new(),
@@ -88,25 +87,21 @@ impl<Id: Copy + Ord> Changes<Id> {
     }
 
     /// Returns the pairs of the last update that the previous one did not have.
-    #[must_use]
     pub fn begun(&self) -> &[(Id, Id)] {
         &self.begun
     }
 
     /// Returns the pairs of the previous update that the last one does not have.
-    #[must_use]
     pub fn ended(&self) -> &[(Id, Id)] {
         &self.ended
     }
 
     /// Returns the number of pairs that the last two updates share.
-    #[must_use]
     pub fn lasting(&self) -> usize {
         self.pairs.len() - self.begun.len()
     }
 
     /// Returns all pairs of the last update.
-    #[must_use]
     pub fn pairs(&self) -> &[(Id, Id)] {
         &self.pairs
     }

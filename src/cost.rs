@@ -119,7 +119,6 @@ impl<'a> Frame<'a> {
 
 impl CostTerm {
     /// Creates a term with its nanoseconds for each count.
-    #[must_use]
     pub const fn new(term: Term, unit_ns: f64) -> Self {
         Self { term, unit_ns }
     }
@@ -127,13 +126,11 @@ impl CostTerm {
 
 impl Work {
     /// Creates the sum of these terms, on a machine of unknown cache.
-    #[must_use]
     pub fn new(terms: Vec<CostTerm>) -> Self {
         Self { terms, ..Self::default() }
     }
 
     /// Returns the nanoseconds of a frame under `load`.
-    #[must_use]
     pub fn ns(&self, load: &Load) -> f64 {
         self.cost_of(&Frame::new(load))
     }
@@ -146,7 +143,6 @@ impl Work {
 
     /// Returns what makes it unusable, if anything.
     #[doc(hidden)]
-    #[must_use]
     pub fn defect(&self) -> Option<CurveError> {
         for &CostTerm { term, unit_ns } in &self.terms {
             if !(0.0..=MOST_UNIT_NS).contains(&unit_ns) {
@@ -175,13 +171,11 @@ impl Work {
 
 impl CostCurve {
     /// Creates the sum of these terms on one thread, without fallback and residual, on a machine of unknown cache.
-    #[must_use]
     pub fn new(terms: Vec<CostTerm>) -> Self {
         Self::of(Arc::new(Work::new(terms)))
     }
 
     /// Creates the cost of this work on one thread or on GPUs.
-    #[must_use]
     pub fn of(work: Arc<Work>) -> Self {
         Self { work, ..Self::default() }
     }
@@ -199,7 +193,6 @@ impl CostCurve {
     }
 
     /// Returns the predicted nanoseconds of a frame under `load`.
-    #[must_use]
     pub fn cost_ns(&self, load: &Load) -> f64 {
         self.cost_of(&Frame::new(load))
     }
@@ -211,7 +204,6 @@ impl CostCurve {
     }
 
     /// Returns what makes this curve unusable, if anything.
-    #[must_use]
     pub fn defect(&self) -> Option<CurveError> {
         if let Some(defect) = self.work.defect() {
             return Some(defect);

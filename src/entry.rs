@@ -24,7 +24,6 @@ pub struct Entry {
 
 impl Entry {
     /// Makes the entry of an algorithm that can run.
-    #[must_use]
     pub fn new(id: AlgorithmId, revision: u32) -> Self {
         Self { id, revision, unavailable: None }
     }

@@ -35,7 +35,6 @@ impl Membership {
 
     /// Returns whether two boxes with these memberships are wanted as a pair.
     #[inline]
-    #[must_use]
     pub fn wants(&self, other: &Self) -> bool {
         // Without branches: with many groups no CPU could predict them.
         (self.groups & other.mask != 0)
@@ -87,7 +86,6 @@ pub struct Filter {
 
 impl Filter {
     /// Makes a filter from the membership of each box.
-    #[must_use]
     pub fn new(memberships: Vec<Membership>) -> Self {
         Self { memberships }
     }
@@ -100,7 +98,6 @@ impl Filter {
 
     /// Returns whether the boxes at these two positions are wanted as a pair.
     #[inline]
-    #[must_use]
     pub fn wants(&self, (a, b): Pair) -> bool {
         self.of(a).wants(self.of(b))
     }

@@ -42,7 +42,6 @@ named! {
 
 impl GpuIdentity {
     /// Creates a GPU of which only number, name and kind are known.
-    #[must_use]
     pub fn new(index: u32, name: impl Into<String>, kind: GpuKind) -> Self {
         Self { index, name: name.into(), device: String::new(), driver: String::new(), api: String::new(), kind }
     }

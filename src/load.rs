@@ -52,7 +52,6 @@ impl Load {
     /// let load = Load::of_objects(1000).with_pairs(450.0);
     /// assert_eq!((load.objects, load.pairs), (1000, 450.0));
     /// ```
-    #[must_use]
     pub fn of_objects(objects: u32) -> Self {
         Self { objects, ..Self::default() }
     }
@@ -99,7 +98,6 @@ impl Load {
     }
 
     /// Returns whether every number is finite and none is negative.
-    #[must_use]
     pub fn is_sound(&self) -> bool {
         let Self { objects: _, axis_candidates, strip_candidates, pairs, moved, moved_share } = *self;
         [axis_candidates, strip_candidates, pairs, moved, moved_share].iter().all(|v| v.is_finite() && *v >= 0.0)
@@ -108,7 +106,6 @@ impl Load {
     /// Estimates the load of a frame from up to 256 of its boxes, in a time that is constant above 16 000 boxes.
     ///
     /// `pairs` is the number of pairs of the previous frame, and `motion` that since; both `None` if there was none.
-    #[must_use]
     pub fn estimate(boxes: &[Aabb], pairs: Option<f64>, motion: Option<Motion>) -> Self {
         Self::planned(boxes, pairs, motion).0
     }

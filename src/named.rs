@@ -11,7 +11,6 @@ pub struct UnknownName {
 
 impl UnknownName {
     /// Makes the error of a text that is no name of this kind.
-    #[must_use]
     pub fn new(kind: &'static str, text: &str) -> Self {
         Self { kind, text: text.to_owned() }
     }
@@ -43,7 +42,6 @@ macro_rules! named {
             pub const ALL: [Self; [$($text),+].len()] = [$(Self::$variant),+];
 
             /// Returns the name in files.
-            #[must_use]
             pub const fn as_str(self) -> &'static str {
                 match self {
                     $(Self::$variant => $text,)+

@@ -70,13 +70,11 @@ pub struct Pairs {
 
 impl Pairs {
     /// Makes an empty list in any order and without a limit.
-    #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
     /// Makes an empty list that wants its pairs in `order`.
-    #[must_use]
     pub fn with_order(order: PairOrder) -> Self {
         Self { order, ..Self::default() }
     }
@@ -92,7 +90,6 @@ impl Pairs {
     }
 
     /// Returns the limit set by [`set_limit`](Self::set_limit).
-    #[must_use]
     pub fn limit(&self) -> Option<usize> {
         self.limit
     }
@@ -103,7 +100,6 @@ impl Pairs {
     }
 
     /// Returns the filter set by [`set_filter`](Self::set_filter).
-    #[must_use]
     pub fn filter(&self) -> Option<&Filter> {
         self.filter.as_deref().map(|screen| &screen.filter)
     }
@@ -115,7 +111,6 @@ impl Pairs {
 
     /// Returns what tells whether the filter is another one in a later frame.
     #[doc(hidden)]
-    #[must_use]
     pub fn filter_state(&self) -> FilterState {
         FilterState(self.filter.as_ref().map_or_else(Weak::new, Arc::downgrade))
     }
@@ -126,25 +121,21 @@ impl Pairs {
     }
 
     /// Returns the order that the caller wants.
-    #[must_use]
     pub fn order(&self) -> PairOrder {
         self.order
     }
 
     /// Returns the pairs of the last frame.
-    #[must_use]
     pub fn as_slice(&self) -> &[Pair] {
         &self.buffer[..self.len]
     }
 
     /// Returns the number of pairs of the last frame.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.len
     }
 
     /// Returns whether the last frame has no pair.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
@@ -160,13 +151,11 @@ impl Pairs {
     /// Without a filter this is [`len`](Self::len). With one it depends on the algorithm: `brute`, `sap` and `grid-sap`
     /// find unwanted pairs that `bvh` and `pair-cache` rule out earlier. GPUs do not count them, unless the filter
     /// does not fit into a buffer and the host tests the pairs.
-    #[must_use]
     pub fn overlapping(&self) -> u64 {
         self.len as u64 + self.unwanted
     }
 
     /// Returns a 64-bit hash of the set of pairs, which does not depend on their order.
-    #[must_use]
     pub fn fingerprint(&self) -> u64 {
         self.iter().fold(self.len as u64, |sum, &(i, j)| sum.wrapping_add(mix(u64::from(i) << 32 | u64::from(j))))
     }

@@ -35,13 +35,11 @@ described! {
 
 impl Ray {
     /// Makes a ray without an end.
-    #[must_use]
     pub const fn new(origin: [f32; 3], direction: [f32; 3]) -> Self {
         Self { origin, direction, max: f32::INFINITY }
     }
 
     /// Returns why this ray is invalid, or `None` if it is valid.
-    #[must_use]
     pub fn defect(&self) -> Option<RayDefect> {
         if self.max.is_nan() || self.origin.iter().chain(&self.direction).any(|v| !v.is_finite()) {
             Some(RayDefect::NotFinite)

@@ -63,14 +63,12 @@ enum Maker {
 
 impl Registry {
     /// Makes a registry of the built-in algorithms on 1, 2, 4, ... and all usable cores of this machine.
-    #[must_use]
     pub fn new() -> Self {
         Self::with_cores(usable_cores())
     }
 
     /// Makes a registry of the built-in algorithms on 1, 2, 4, ... and `cores` threads. Any number up to `cores` can be
     /// [created](Self::create). `cores` may exceed the cores of this machine, for tests.
-    #[must_use]
     pub fn with_cores(cores: u32) -> Self {
         let mut registry = Self {
             entries: Vec::new(),
@@ -163,7 +161,6 @@ impl Registry {
     }
 
     /// Returns the source of a type that was added.
-    #[must_use]
     pub fn source<S: AlgorithmSource>(&self) -> Option<&S> {
         self.sources.iter().find_map(|s| (&**s as &dyn Any).downcast_ref())
     }
@@ -251,13 +248,11 @@ impl Registry {
     }
 
     /// Returns every algorithm, the built-in ones first.
-    #[must_use]
     pub fn entries(&self) -> &[Entry] {
         &self.entries
     }
 
     /// Returns the algorithms that can run here.
-    #[must_use]
     pub fn available(&self) -> Vec<Entry> {
         self.entries.iter().filter(|e| e.unavailable.is_none()).cloned().collect()
     }
@@ -271,7 +266,6 @@ impl Registry {
     /// Returns the kind of helper threads, in a word.
     #[doc(hidden)]
     #[cfg(feature = "parallel")]
-    #[must_use]
     pub fn helpers(&self) -> &'static str {
         self.threads.kind()
     }
@@ -364,7 +358,6 @@ impl fmt::Debug for Registry {
 
 /// Returns the number of threads that may run at once on this machine, with affinity and cgroup quota respected; 1 if
 /// the system does not tell.
-#[must_use]
 pub fn usable_cores() -> u32 {
     std::thread::available_parallelism().map_or(1, |n| u32::try_from(n.get()).unwrap_or(u32::MAX))
 }

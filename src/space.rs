@@ -147,7 +147,6 @@ impl Default for Space {
 impl Space {
     /// Makes an empty space, with the [usual](Tuning::usual) tuning and a registry of its own. It starts no thread: an
     /// update with many active bodies does.
-    #[must_use]
     pub fn new() -> Self {
         let registry = Registry::new();
         let search = Adaptive::new(Tuning::usual(&registry), &registry);
@@ -155,7 +154,6 @@ impl Space {
     }
 
     /// Makes an empty space in which `search` finds the pairs of active bodies.
-    #[must_use]
     pub fn with(search: Adaptive) -> Self {
         Self {
             search,
@@ -177,7 +175,6 @@ impl Space {
     }
 
     /// Returns what finds the pairs of active bodies, for its [decisions](Adaptive::last_decision).
-    #[must_use]
     pub fn search(&self) -> &Adaptive {
         &self.search
     }
@@ -194,13 +191,11 @@ impl Space {
     }
 
     /// Returns the number of bodies.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.slots.len()
     }
 
     /// Returns whether there is no body.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -300,13 +295,11 @@ impl Space {
     }
 
     /// Returns whether there is a body with this handle.
-    #[must_use]
     pub fn contains(&self, handle: Handle) -> bool {
         self.slots.find(handle).is_ok()
     }
 
     /// Returns the box and the body of a handle, as set last; `None` if it is stale.
-    #[must_use]
     pub fn get(&self, handle: Handle) -> Option<(&Aabb, &Body)> {
         let slot = self.slots.find(handle).ok()?;
         Some((&self.slots.boxes()[slot as usize], self.slots.body(slot)))
@@ -321,19 +314,16 @@ impl Space {
     /// overlap.
     ///
     /// The order depends on the calls that were made. For an order that depends on the pairs alone, sort them.
-    #[must_use]
     pub fn pairs(&self) -> &[(Handle, Handle)] {
         &self.pairs
     }
 
     /// Returns the pairs that the previous update did not have, ascending.
-    #[must_use]
     pub fn begun(&self) -> &[(Handle, Handle)] {
         &self.begun
     }
 
     /// Returns the pairs that only the previous update had, ascending. Those of removed bodies are among them.
-    #[must_use]
     pub fn ended(&self) -> &[(Handle, Handle)] {
         &self.ended
     }

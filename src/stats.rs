@@ -4,7 +4,6 @@
 pub const NORMAL_90: f64 = 1.645;
 
 /// Returns the density of a standard normal variable.
-#[must_use]
 pub fn normal_density(x: f64) -> f64 {
     (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt()
 }

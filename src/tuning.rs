@@ -105,7 +105,6 @@ pub struct AlgorithmCost {
 
 impl Step {
     /// `algorithm`, from this many objects up.
-    #[must_use]
     pub fn new(from_objects: u32, algorithm: AlgorithmId) -> Self {
         Self { from_objects, algorithm }
     }
@@ -113,7 +112,6 @@ impl Step {
 
 impl AlgorithmCost {
     /// The cost of a revision of an algorithm.
-    #[must_use]
     pub fn new(algorithm: AlgorithmId, revision: u32, curve: CostCurve, spread_ln: f64) -> Self {
         Self { algorithm, revision, curve, spread_ln }
     }
@@ -149,7 +147,6 @@ impl Tuning {
     /// They are the rounded crossovers of `uniform` on the machines of the first reports, which have two cores. More
     /// than two threads are extrapolated, with more work for each thread. Another machine has other crossovers:
     /// predict or measure them.
-    #[must_use]
     pub fn usual(registry: &Registry) -> Self {
         let step = |from_objects, method, threads| Step { from_objects, algorithm: AlgorithmId::cpu(method, threads) };
         let mut steps = vec![step(0, "brute", 1), step(80, "pair-cache", 1)];
@@ -167,7 +164,6 @@ impl Tuning {
     /// may be missed, and an algorithm that is cheaper by less than 2 % has none. The interval of a crossover holds
     /// the loads at which the logarithms of the two costs differ by less than [`NORMAL_90`](crate::stats::NORMAL_90)
     /// standard deviations.
-    #[must_use]
     pub fn from_costs(source: Source, scenario: &str, costs: Vec<AlgorithmCost>, loads: &[Load]) -> Self {
         let spreads: Vec<f64> = costs.iter().map(|c| c.spread_ln).collect();
         let spread = |below: usize, above: usize, _: &Load| spreads[below].hypot(spreads[above]);
@@ -181,7 +177,6 @@ impl Tuning {
     /// As [`Tuning::from_costs`], with intervals from `spread`: for two positions in `costs` and a load, it returns
     /// the standard deviation of the logarithm of the ratio of the two costs. Describe it in
     /// [`Tuning::interval_basis`].
-    #[must_use]
     pub fn from_costs_with(
         source: Source,
         scenario: &str,
@@ -219,7 +214,6 @@ impl Tuning {
     }
 
     /// The algorithms that this tuning may choose: those of `costs` in their order, else those of `steps`.
-    #[must_use]
     pub fn algorithms(&self) -> Vec<&AlgorithmId> {
         if self.costs.is_empty() {
             let mut list: Vec<&AlgorithmId> = Vec::new();
@@ -266,19 +260,16 @@ impl Tuning {
     /// Returns the position in [`Tuning::costs`] of the cheapest algorithm under `load`, and its predicted cost in
     /// nanoseconds. `usable` gets a position and returns whether that algorithm may be chosen. `None` without cost
     /// curves, or if none is usable.
-    #[must_use]
     pub fn cheapest(&self, load: &Load, usable: impl Fn(usize) -> bool) -> Option<(usize, f64)> {
         slice::cheapest(&self.costs, load, usable)
     }
 
     /// The step that holds at a number of objects.
-    #[must_use]
     pub fn step(&self, objects: u32) -> Option<&Step> {
         self.steps[..self.steps.partition_point(|s| s.from_objects <= objects)].last()
     }
 
     /// The first thing that makes this tuning unusable, if any.
-    #[must_use]
     pub fn defect(&self) -> Option<TuningError> {
         // Without loads there are no steps, and the costs decide.
         let starts = self.steps.first().map_or(!self.costs.is_empty(), |s| s.from_objects == 0);

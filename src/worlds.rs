@@ -42,7 +42,6 @@ pub struct Worlds {
 impl Worlds {
     /// Makes a search on as many threads as algorithms of this registry may have. One with
     /// [`Registry::with_cores(1)`](Registry::with_cores) runs on the calling thread alone.
-    #[must_use]
     pub fn new(registry: &Registry) -> Self {
         Self {
             workers: registry.most_workers("worlds"),
@@ -82,7 +81,6 @@ impl Worlds {
 
     /// Returns where the pairs of each world begin, then the number of pairs: one element for each of the starts of the
     /// last call. Empty if that failed.
-    #[must_use]
     pub fn offsets(&self) -> &[usize] {
         &self.offsets
     }
@@ -91,7 +89,6 @@ impl Worlds {
     ///
     /// # Panics
     /// If that call failed or had no such world.
-    #[must_use]
     pub fn pairs_of<'a>(&self, world: usize, pairs: &'a Pairs) -> &'a [Pair] {
         &pairs.as_slice()[self.offsets[world]..self.offsets[world + 1]]
     }

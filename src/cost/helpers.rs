@@ -23,7 +23,6 @@ pub struct Helpers {
 
 impl Helpers {
     /// Creates helpers that are called for free, wake at once, and are as fast as the caller.
-    #[must_use]
     pub fn new(threads: u32) -> Self {
         Self { threads, call_ns: 0.0, late_ns: 0.0, speed_up: f64::from(threads), boxes_per_thread: 0 }
     }
@@ -35,7 +34,6 @@ impl Helpers {
     }
 
     /// Returns the nanoseconds of a frame of `objects` boxes that takes `work_ns` on one thread.
-    #[must_use]
     pub fn cost_ns(&self, objects: u32, work_ns: f64) -> f64 {
         let Some(share) = self.share(objects) else { return work_ns };
         let speed_up = 1.0 + share * (self.speed_up - 1.0);

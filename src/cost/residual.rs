@@ -63,7 +63,6 @@ impl Places {
     pub const MOST: usize = 64;
 
     /// Creates places at the first [`Places::MOST`] of these loads.
-    #[must_use]
     pub fn new(mut loads: Vec<Load>) -> Self {
         loads.truncate(Self::MOST);
         let all = loads.clone();
@@ -71,7 +70,6 @@ impl Places {
     }
 
     /// Creates places at these loads, clamped to the sizes of `all`.
-    #[must_use]
     pub fn of_sizes(loads: Vec<Load>, all: &[Load]) -> Self {
         let (count, octaves) = (loads.len(), sizes(all));
         let mut coordinates = vec![0.0; COORDINATES * count];
@@ -84,14 +82,12 @@ impl Places {
     }
 
     /// Returns the loads, in the order of the weights of residuals.
-    #[must_use]
     pub fn loads(&self) -> &[Load] {
         &self.loads
     }
 
     /// Returns the similarity of `load` to each place, 0 to 1, which is the correlation of two values of a residual.
     /// With `by_motion` it depends on how far boxes move too.
-    #[must_use]
     pub fn likeness(&self, load: &Load, by_motion: bool) -> Vec<f64> {
         self.likeness_of(load)[usize::from(by_motion)][..self.loads.len()].to_vec()
     }
@@ -142,7 +138,6 @@ impl From<Places> for Vec<Load> {
 
 impl Residual {
     /// Creates a residual with weights for the first places and no constant.
-    #[must_use]
     pub fn new(places: Arc<Places>, weights: Vec<f64>, by_motion: bool) -> Self {
         Self { places, constant: 0.0, weights, by_motion }
     }
@@ -154,7 +149,6 @@ impl Residual {
     }
 
     /// Returns the natural logarithm of the factor on the cost under a load.
-    #[must_use]
     pub fn ln(&self, load: &Load) -> f64 {
         self.ln_of(&self.places.likeness_of(load))
     }

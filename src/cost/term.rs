@@ -98,7 +98,6 @@ const WORKING_SET_BYTES: f64 = 64.0;
 
 impl Term {
     /// Returns the count under a load, on a machine with a last-level cache of `cache_bytes`.
-    #[must_use]
     pub fn count(self, load: &Load, cache_bytes: f64) -> f64 {
         Counts::new(load).of(self, cache_bytes)
     }

@@ -27,7 +27,6 @@ pub struct SimdLevelError(String);
 
 impl SimdLevel {
     /// Returns the highest level that this CPU has.
-    #[must_use]
     pub fn detected() -> Self {
         Simd::at_most(Self::Avx512).level()
     }
@@ -37,7 +36,6 @@ impl SimdLevel {
     /// Each new [`Registry`](crate::Registry) reads the variable once. A level that the CPU lacks and a name of no
     /// level are ignored, because a library can't refuse to load. Programs that want to refuse call
     /// [`SimdLevel::requested`].
-    #[must_use]
     pub fn in_use() -> Self {
         Self::requested().ok().flatten().unwrap_or_else(Self::detected)
     }
@@ -58,7 +56,6 @@ impl SimdLevel {
     }
 
     /// Returns the number of 32-bit floats in a vector of this level.
-    #[must_use]
     pub fn lanes(self) -> u32 {
         match self {
             Self::Portable => 4,

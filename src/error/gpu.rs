@@ -61,7 +61,6 @@ impl GpuError {
     }
 
     /// The kind of error.
-    #[must_use]
     pub fn kind(&self) -> GpuErrorKind {
         self.kind
     }

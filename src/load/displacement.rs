@@ -69,7 +69,6 @@ impl Displacement {
     ///
     /// Edges are clamped to four times their 0.9 quantile: a box as large as the world moves far when it passes many
     /// others, however small a share of its edge that is.
-    #[must_use]
     pub fn motion(&self, boxes: &[Aabb]) -> Option<Motion> {
         let (mut moves, mut edges) = ([(0.0, 0.0); WATCHED], [0.0; WATCHED]);
         let mut count = 0;

@@ -36,13 +36,11 @@ impl FramePlan {
 
     /// Returns the motion in a frame, [`Motion::moved`](crate::algorithm::Motion::moved) of this frame or of a recent
     /// one; `None` if unknown.
-    #[must_use]
     pub fn moved(&self) -> Option<f64> {
         self.moved
     }
 
     /// Returns the number of overlapping pairs in a recent frame; `None` if unknown.
-    #[must_use]
     pub fn pairs(&self) -> Option<f64> {
         self.pairs
     }

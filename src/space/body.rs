@@ -29,14 +29,12 @@ impl From<Membership> for Body {
 impl Body {
     /// Makes a body that meets no other fixed or kinematic body. Use it for what rarely moves: walls, the ground. It
     /// may be [set](crate::Space::set) all the same.
-    #[must_use]
     pub fn fixed() -> Self {
         Membership { fixed: true, ..Membership::ALL }.into()
     }
 
     /// Makes a body that the program moves along a path, such as a lift. It meets neither fixed bodies nor kinematic
     /// ones.
-    #[must_use]
     pub fn kinematic() -> Self {
         Self { kinematic: true, ..Self::fixed() }
     }
@@ -72,13 +70,11 @@ impl Body {
     }
 
     /// Returns the number set by [`user_data`](Self::user_data), 0 by default.
-    #[must_use]
     pub fn get_user_data(&self) -> u64 {
         self.user_data
     }
 
     /// Returns whether the body was made by [`kinematic`](Self::kinematic).
-    #[must_use]
     pub fn is_kinematic(&self) -> bool {
         self.kinematic
     }
@@ -89,7 +85,6 @@ impl Body {
     }
 
     /// Returns the groups, the mask, the owner, and whether the body is fixed or kinematic.
-    #[must_use]
     pub fn membership(&self) -> &Membership {
         &self.membership
     }

@@ -33,13 +33,11 @@ impl Handle {
     }
 
     /// Returns the 64 bits of the handle.
-    #[must_use]
     pub fn to_bits(self) -> u64 {
         self.0.get()
     }
 
     /// Returns the handle with these bits, `None` for 0.
-    #[must_use]
     pub fn from_bits(bits: u64) -> Option<Self> {
         NonZeroU64::new(bits).map(Self)
     }

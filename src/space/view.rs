@@ -32,13 +32,11 @@ pub struct View<'a> {
 
 impl Space {
     /// Returns a view of the bodies that `body` may meet.
-    #[must_use]
     pub fn view(&self, body: &Body) -> View<'_> {
         View { space: self, by: Some(body.membership) }
     }
 
     /// Returns a view of all bodies.
-    #[must_use]
     pub fn all(&self) -> View<'_> {
         View { space: self, by: None }
     }

@@ -23,7 +23,6 @@ pub struct Crossover {
 
 impl Crossover {
     /// Both ends of the interval, if there is one.
-    #[must_use]
     pub fn interval(&self) -> Option<(f64, f64)> {
         self.low.zip(self.high)
     }
