@@ -2,8 +2,7 @@
 
 use crate::engine::two_columns;
 use crate::frame::{Flat, Frames, Ids};
-use crate::start::{self};
-use crate::{Held, Keywords, PyTuning, Start, boxes, call, exception, learning_methods, unusable};
+use crate::{Held, Keywords, PyTuning, Start, boxes, call, exception, learning_methods, start, unusable};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use sapwise::Membership;

@@ -1,7 +1,6 @@
 //! What a class holds that searches and learns: behind a lock, made anew after a fork, saved at the end of a block.
 
-use crate::start::{self};
-use crate::{PyDecision, PyTuning, Start, call, failed, with_cause};
+use crate::{PyDecision, PyTuning, Start, call, failed, start, with_cause};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use sapwise::Adaptive;

@@ -1,10 +1,9 @@
 //! The class `Space`.
 
 use crate::handles::{bits, check, first_stale, handles, pairs};
-use crate::start::{self};
 use crate::view::PyView;
 use crate::{
-    Held, Keywords, PyTuning, Searcher, Start, array, exception, invalid_box, kept, learning_methods, unusable,
+    Held, Keywords, PyTuning, Searcher, Start, array, exception, invalid_box, kept, learning_methods, start, unusable,
 };
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
