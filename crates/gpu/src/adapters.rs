@@ -34,7 +34,6 @@ impl Gpus {
     /// Finds GPUs. Loads the drivers of the system, which takes tens of milliseconds.
     ///
     /// The environment variables of drivers and wgpu apply (`VK_DRIVER_FILES`, `WGPU_BACKEND`, ...).
-    #[must_use]
     pub fn find() -> Self {
         let adapters = pollster::block_on(adapters());
         let infos: Vec<wgpu::AdapterInfo> = adapters.iter().map(wgpu::Adapter::get_info).collect();
@@ -70,7 +69,6 @@ impl Gpus {
     ///     registry
     /// }
     /// ```
-    #[must_use]
     pub fn of(gpus: impl IntoIterator<Item = Gpu>) -> Self {
         let mut found: Vec<Arc<Found>> = Vec::new();
         for gpu in gpus {
@@ -89,7 +87,6 @@ impl Gpus {
     }
 
     /// No GPU at all. Loads no driver.
-    #[must_use]
     pub fn none() -> Self {
         Self::default()
     }
@@ -101,7 +98,6 @@ impl Gpus {
     /// # use sapwise_gpu::Gpus;
     /// let real = Gpus::find().choose(|gpu| gpu.kind != GpuKind::Software);
     /// ```
-    #[must_use]
     pub fn choose(&self, wanted: impl Fn(&GpuIdentity) -> bool) -> Self {
         Self { found: self.found.iter().filter(|f| wanted(&f.identity)).cloned().collect() }
     }
@@ -134,20 +130,17 @@ impl Gpus {
     }
 
     /// Returns how many there are.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.found.len()
     }
 
     /// Returns whether there is none.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.found.is_empty()
     }
 
     /// Returns the adapter with this number, for more than [`GpuIdentity`] has. `None` for a GPU that the program
     /// opened itself.
-    #[must_use]
     pub fn adapter(&self, index: u32) -> Option<&wgpu::Adapter> {
         self.found(index)?.adapter.as_ref()
     }
@@ -213,7 +206,6 @@ impl Found {
 
 /// Returns the identity of a GPU with this number, from what wgpu reports. An open device has it in
 /// `wgpu::Device::adapter_info`.
-#[must_use]
 pub fn identity(index: u32, info: &wgpu::AdapterInfo) -> GpuIdentity {
     GpuIdentity {
         index,

@@ -42,7 +42,6 @@ impl AsyncBroadPhase {
     }
 
     /// Returns the algorithm.
-    #[must_use]
     pub fn id(&self) -> &AlgorithmId {
         &self.id
     }

@@ -76,7 +76,6 @@ impl Gpu {
     ///
     /// The program's handlers for lost devices and uncaught errors stay in place, and never see an error of ours. We
     /// notice a lost device when it takes no more work.
-    #[must_use]
     pub fn from_parts(device: wgpu::Device, queue: wgpu::Queue, identity: GpuIdentity) -> Self {
         let limits = device.limits();
         let wait_limit_ms = AtomicU64::new(WAIT_LIMIT.as_millis() as u64);
@@ -186,31 +185,26 @@ impl Gpu {
     }
 
     /// Returns the identity of the GPU.
-    #[must_use]
     pub fn identity(&self) -> &GpuIdentity {
         &self.shared.identity
     }
 
     /// Returns the device.
-    #[must_use]
     pub fn device(&self) -> &wgpu::Device {
         &self.shared.device
     }
 
     /// Returns the queue.
-    #[must_use]
     pub fn queue(&self) -> &wgpu::Queue {
         &self.shared.queue
     }
 
     /// Returns the limits with which the device was opened.
-    #[must_use]
     pub fn limits(&self) -> &wgpu::Limits {
         &self.shared.limits
     }
 
     /// Returns why the GPU can no longer be used: it was lost, or an unexpected error came. `None` if it can.
-    #[must_use]
     pub fn fault(&self) -> Option<String> {
         self.error().map(|error| error.to_string())
     }

@@ -15,7 +15,6 @@ pub(super) fn has_method(name: &str) -> bool {
 
 /// Returns each method on each of these GPUs alone, and on the first two, the first three and so on together.
 /// Software adapters work together with each other only.
-#[must_use]
 pub fn algorithms<'a>(gpus: impl IntoIterator<Item = &'a GpuIdentity>) -> Vec<Entry> {
     let (software, hardware): (Vec<_>, Vec<_>) = gpus.into_iter().partition(|g| g.kind == GpuKind::Software);
     let mut sets: Vec<Vec<u32>> = Vec::new();

@@ -126,7 +126,6 @@ impl Resident {
 
     /// Returns the last frame that had arrived when a frame was last [submitted](Self::submit): usually the previous
     /// one. If the GPU is behind, some frames are never reported. `None` before the first.
-    #[must_use]
     pub fn last(&self) -> Option<SubmittedCounts> {
         self.last
     }
