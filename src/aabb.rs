@@ -5,8 +5,7 @@ mod bounds;
 #[cfg(any(feature = "glam-034", feature = "mint"))]
 mod conversions;
 
-use crate::Error;
-use crate::error::BoxDefect;
+use crate::{BoxDefect, Error};
 
 /// An axis-aligned bounding box, closed on every side: boxes that touch overlap.
 ///

@@ -1,9 +1,7 @@
 //! The pairs between two lists of boxes.
 
-use crate::broad_phase::check_count;
 use crate::cpu::{Columns, Group, LANES, Members, Outputs, Simd, Tree, Workers, brute_rows, part};
-use crate::load::SceneStats;
-use crate::{Aabb, Error, Pairs, Registry};
+use crate::{Aabb, Error, Pairs, Registry, SceneStats, check_count};
 
 /// Most boxes of the shorter list without a tree: they are compared with each box of the longer list that overlaps
 /// their bounds. With more, it pays to sort.

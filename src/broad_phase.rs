@@ -1,7 +1,6 @@
 //! The interface of every algorithm.
 
-use crate::load::FramePlan;
-use crate::{Aabb, Error, Pairs};
+use crate::{Aabb, Error, FramePlan, Pairs};
 
 /// Finds all pairs of overlapping boxes.
 ///

@@ -132,14 +132,9 @@ impl<Id: Copy + Ord> Changes<Id> {
 
     /// Compares the next pairs with the present ones, then replaces them.
     fn compare(&mut self) -> Result<(), Error> {
-        let found = differences(&self.next, &self.pairs, |pair| pair, &mut self.begun, &mut self.ended);
-        if found.is_ok() {
-            std::mem::swap(&mut self.pairs, &mut self.next);
-        } else {
-            self.begun.clear();
-            self.ended.clear();
-        }
-        found
+        differences(&self.next, &self.pairs, |pair| pair, &mut self.begun, &mut self.ended)?;
+        std::mem::swap(&mut self.pairs, &mut self.next);
+        Ok(())
     }
 }
 
@@ -192,7 +187,7 @@ fn fill<Id: Copy>(pairs: &mut Vec<(Id, Id)>, keys: &[u64], id: impl Fn(u32) -> I
 }
 
 /// Adds what `name` returns for the elements that only `now` has to `begun`, and for those that only `before` has to
-/// `ended`. Both lists ascend.
+/// `ended`. Both lists ascend. Clears `begun` and `ended` after an error.
 pub(crate) fn differences<T: Copy + Ord, N>(
     now: &[T],
     before: &[T],
@@ -201,7 +196,7 @@ pub(crate) fn differences<T: Copy + Ord, N>(
     ended: &mut Vec<N>,
 ) -> Result<(), Error> {
     let (mut now, mut before) = (now.iter().peekable(), before.iter().peekable());
-    loop {
+    let mut compare = || loop {
         match (now.peek(), before.peek()) {
             // First, because most pairs last.
             (Some(a), Some(b)) if a == b => {
@@ -220,7 +215,11 @@ pub(crate) fn differences<T: Copy + Ord, N>(
             }
             _ => return Ok(()),
         }
-    }
+    };
+    compare().inspect_err(|_| {
+        begun.clear();
+        ended.clear();
+    })
 }
 
 fn reserve<T>(list: &mut Vec<T>, more: usize) -> Result<(), Error> {
@@ -230,7 +229,7 @@ fn reserve<T>(list: &mut Vec<T>, more: usize) -> Result<(), Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pair::Pair;
+    use crate::Pair;
 
     fn pairs(of: &[Pair]) -> Pairs {
         let mut pairs = Pairs::new();

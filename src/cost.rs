@@ -7,7 +7,7 @@ mod helpers;
 mod residual;
 mod term;
 
-use crate::algorithm::Load;
+use crate::Load;
 use std::cell::{Cell, OnceCell};
 use std::sync::Arc;
 

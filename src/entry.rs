@@ -1,7 +1,6 @@
 //! An algorithm in a registry.
 
-use crate::AlgorithmId;
-use crate::error::Unavailable;
+use crate::{AlgorithmId, Unavailable};
 
 /// An algorithm in a registry.
 ///

@@ -2,7 +2,7 @@
 
 mod screen;
 
-use crate::pair::Pair;
+use crate::Pair;
 
 pub(crate) use screen::Screen;
 

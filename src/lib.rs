@@ -61,7 +61,6 @@ mod gpu_identity;
 pub mod internals;
 mod load;
 mod named;
-mod pair;
 mod pairs;
 mod ray;
 mod registry;
@@ -75,6 +74,13 @@ pub mod stats;
 mod triad;
 pub mod tuning;
 mod worlds;
+
+use broad_phase::check_count;
+use error::{BoxDefect, Unavailable};
+use filter::Screen;
+use load::{FramePlan, Load, SceneStats};
+use pairs::Pair;
+use splitmix::mix;
 
 pub use aabb::Aabb;
 pub use adaptive::{Adaptive, Decision, Reason};

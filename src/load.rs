@@ -6,8 +6,7 @@ mod sampled_boxes;
 mod scene_stats;
 mod strip_grid;
 
-use crate::Aabb;
-use crate::splitmix::mix;
+use crate::{Aabb, mix};
 
 pub(crate) use displacement::is_same_pace;
 pub use displacement::{Displacement, Motion};

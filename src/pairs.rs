@@ -4,15 +4,15 @@ mod fill;
 mod order;
 
 use crate::cpu::Workers;
-use crate::filter::Screen;
-use crate::pair::Pair;
-use crate::splitmix::mix;
-use crate::{Error, Filter};
+use crate::{Error, Filter, Screen, mix};
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Weak};
 
 pub(crate) use fill::each_bit;
 pub(crate) use order::Sorter;
+
+/// A pair of boxes: two positions in the input, the lower one first.
+pub type Pair = (u32, u32);
 
 /// The order in which a caller wants the pairs.
 ///

@@ -3,8 +3,7 @@
 use crate::algorithm::{Backend, BackendClass, MOST_THREADS, ParseIdError};
 use crate::cpu::{self, Made, Method, Simd, SimdLevel, Threads, Workers};
 use crate::entry::Entry;
-use crate::error::Unavailable;
-use crate::{AlgorithmId, BroadPhase, Error};
+use crate::{AlgorithmId, BroadPhase, Error, Unavailable};
 use std::any::{Any, TypeId};
 use std::fmt;
 use std::sync::Arc;

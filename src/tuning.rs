@@ -7,9 +7,9 @@ mod file;
 mod slice;
 pub(crate) mod tangents;
 
-use crate::algorithm::{BackendClass, Load};
+use crate::algorithm::BackendClass;
 use crate::cost::Residual;
-use crate::{AlgorithmId, Registry, named};
+use crate::{AlgorithmId, Load, Registry, named};
 use slice::Slice;
 use std::sync::Arc;
 

@@ -1,9 +1,7 @@
 //! Many small worlds, searched in one call.
 
-use crate::broad_phase::check_count;
 use crate::cpu::{Outputs, Simd, Workers, WorldSearch, part, reserve, split};
-use crate::pair::Pair;
-use crate::{Aabb, Error, Pairs, Registry};
+use crate::{Aabb, Error, Pair, Pairs, Registry, check_count};
 
 /// Boxes that are searched in the time that `grid-sap` takes for one, in round numbers.
 const BOXES_PER_BOX: usize = 4;

@@ -4,7 +4,7 @@
 //! Gaussian process regression, 2005): a weighted sum of the load's similarity to each of some places. Far from all
 //! places it is zero, and the terms alone hold.
 
-use crate::algorithm::Load;
+use crate::Load;
 use std::sync::Arc;
 
 /// Coordinates of a load. The last one counts only for algorithms that are cheaper if boxes move little.

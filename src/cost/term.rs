@@ -1,6 +1,6 @@
 //! The terms of a cost: counts of operations under a load.
 
-use crate::algorithm::Load;
+use crate::Load;
 
 /// A count of operations that grows with the load in its own way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

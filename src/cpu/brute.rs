@@ -1,9 +1,7 @@
 //! Tests each of the n (n - 1) / 2 pairs on three axes, as in the paper.
 
-use crate::broad_phase::check_count;
 use crate::cpu::{Columns, Made, Outputs, Simd, Threads, Workers, brute_rows, ensure};
-use crate::filter::Screen;
-use crate::{Aabb, BroadPhase, Error, Pairs};
+use crate::{Aabb, BroadPhase, Error, Pairs, Screen, check_count};
 
 /// Pairs that are tested in the time that `grid-sap` takes for a box, in round numbers.
 const PAIRS_PER_BOX: usize = 512;
@@ -87,7 +85,7 @@ fn row(rows: usize, boxes: usize, k: usize, parts: usize) -> usize {
 
 /// Returns the overlapping pairs that are `wanted`, by two plain loops: what tests compare methods with.
 #[cfg(test)]
-pub(super) fn double_loop(boxes: &[Aabb], wanted: impl Fn(crate::pair::Pair) -> bool) -> Pairs {
+pub(super) fn double_loop(boxes: &[Aabb], wanted: impl Fn(crate::Pair) -> bool) -> Pairs {
     let mut pairs = Pairs::new();
     for j in 0..boxes.len() as u32 {
         let meets = |i: &u32| boxes[*i as usize].overlaps(&boxes[j as usize]);

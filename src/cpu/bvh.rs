@@ -3,10 +3,8 @@
 //! The cost of a frame follows the numbers of boxes and pairs, wherever the boxes lie and whatever their sizes: see
 //! [`tree`](super::tree).
 
-use crate::broad_phase::check_count;
 use crate::cpu::{Made, Outputs, Simd, Threads, Tree, Upkeep, Workers};
-use crate::load::FramePlan;
-use crate::{Aabb, BroadPhase, Error, Pairs};
+use crate::{Aabb, BroadPhase, Error, FramePlan, Pairs, check_count};
 
 /// The method; see the module.
 #[derive(Debug)]

@@ -18,13 +18,12 @@
 //! [tree](super::tree). Its boxes are compared with each other, but for two passive ones, and with the boxes of every
 //! strip.
 
-use crate::broad_phase::check_count;
 use crate::cpu::{
     Columns, Group, Input, LANES, Made, Members, Outputs, Simd, Threads, Tree, Workers, ensure, order_key, part,
     reserve, sweep_rows,
 };
-use crate::load::{FramePlan, SceneStats, StripGrid, StripSpan};
-use crate::{Aabb, BroadPhase, Error, Pairs};
+use crate::load::{StripGrid, StripSpan};
+use crate::{Aabb, BroadPhase, Error, FramePlan, Pairs, SceneStats, check_count};
 use std::ops::Range;
 
 /// Most boxes of a strip. The boxes of a fuller one go into the tree. This is sixteen times the number in a strip of

@@ -1,8 +1,8 @@
 //! The threads that help the calling one.
 
+use crate::Unavailable;
 use crate::cpu::phases::Phases;
 use crate::cpu::placement::CpuPlacement;
-use crate::error::Unavailable;
 use std::sync::{Arc, OnceLock};
 
 /// Rounds of spinning in which a helper waits for the next phase of a frame: about 60 µs. With 10 000 boxes the serial

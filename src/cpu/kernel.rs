@@ -18,9 +18,8 @@ pub(crate) mod walk;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-use crate::Aabb;
-use crate::pair::Pair;
 use crate::pairs::each_bit;
+use crate::{Aabb, Pair};
 use baseline::Four;
 use contain::{BLOCK, within};
 use floats::Floats;
@@ -109,36 +108,40 @@ mod baseline {
     pub(super) type Lanes = [f32; 16];
 }
 
-/// Calls a kernel in a function that enables the instructions of a SIMD level. The kernel is inlined there, and takes
-/// the [`Level`] behind its other arguments. In brackets: generic parameters of the kernel before that of the level,
-/// then their names.
+/// Defines functions, each of which calls a kernel in a function that enables the instructions of a SIMD level. The
+/// kernel is inlined there, and takes the [`Level`] behind its other arguments. In brackets: generic parameters of the
+/// kernel before that of the level, then their names.
 macro_rules! at_level {
-    (
-        $simd:expr, [$($generic:tt)*] [$($name:ident)*]
-        $($kernel:ident)::+ ($($arg:ident: $of:ty),* $(,)?) $(-> $out:ty)?
-    ) => {{
-        #[cfg(target_arch = "x86_64")]
-        #[target_feature(enable = "avx512f")]
-        fn avx512<$($generic)*>($($arg: $of,)* level: $crate::cpu::level::Avx512) $(-> $out)? {
-            $($kernel)::+::<$($name,)* _>($($arg,)* level)
-        }
-        #[cfg(target_arch = "x86_64")]
-        #[target_feature(enable = "avx2")]
-        fn avx2<$($generic)*>($($arg: $of,)* level: $crate::cpu::level::Avx2) $(-> $out)? {
-            $($kernel)::+::<$($name,)* _>($($arg,)* level)
-        }
-        match $simd {
-            // SAFETY: the level proves that this CPU has the instructions.
+    ($(
+        $(#[$meta:meta])*
+        $seen:vis fn $name:ident [$($generic:tt)*] [$($given:ident)*] ($($arg:ident: $of:ty),* $(,)?) $(-> $out:ty)?
+            = $($kernel:ident)::+;
+    )+) => {$(
+        $(#[$meta])*
+        $seen fn $name<$($generic)*>(simd: $crate::cpu::Simd, $($arg: $of),*) $(-> $out)? {
             #[cfg(target_arch = "x86_64")]
-            $crate::cpu::level::Simd::Avx512(level) => unsafe { avx512::<$($name,)*>($($arg,)* level) },
-            // SAFETY: as above.
+            #[target_feature(enable = "avx512f")]
+            fn avx512<$($generic)*>($($arg: $of,)* level: $crate::cpu::level::Avx512) $(-> $out)? {
+                $($kernel)::+::<$($given,)* _>($($arg,)* level)
+            }
             #[cfg(target_arch = "x86_64")]
-            $crate::cpu::level::Simd::Avx2(level) => unsafe { avx2::<$($name,)*>($($arg,)* level) },
-            $crate::cpu::level::Simd::Portable => {
-                $($kernel)::+::<$($name,)* _>($($arg,)* $crate::cpu::kernel::Baseline)
+            #[target_feature(enable = "avx2")]
+            fn avx2<$($generic)*>($($arg: $of,)* level: $crate::cpu::level::Avx2) $(-> $out)? {
+                $($kernel)::+::<$($given,)* _>($($arg,)* level)
+            }
+            match simd {
+                // SAFETY: the level proves that this CPU has the instructions.
+                #[cfg(target_arch = "x86_64")]
+                $crate::cpu::Simd::Avx512(level) => unsafe { avx512::<$($given,)*>($($arg,)* level) },
+                // SAFETY: as above.
+                #[cfg(target_arch = "x86_64")]
+                $crate::cpu::Simd::Avx2(level) => unsafe { avx2::<$($given,)*>($($arg,)* level) },
+                $crate::cpu::Simd::Portable => {
+                    $($kernel)::+::<$($given,)* _>($($arg,)* $crate::cpu::kernel::Baseline)
+                }
             }
         }
-    }};
+    )+};
 }
 use at_level;
 

@@ -1,7 +1,7 @@
 //! Pins threads, for callers who ask for that: one to each physical core before any has two, and to other cores in each
 //! process.
 
-use crate::splitmix::mix;
+use crate::mix;
 use core_affinity::CoreId;
 use std::cell::Cell;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};

@@ -2,10 +2,8 @@
 //!
 //! The paper sweeps along the axis of greatest variance, which a few boxes far away decide.
 
-use crate::broad_phase::check_count;
 use crate::cpu::{Columns, Made, Outputs, Simd, Threads, Workers, ensure, order_key, part, sort, sweep_rows};
-use crate::load::FramePlan;
-use crate::{Aabb, BroadPhase, Error, Pairs};
+use crate::{Aabb, BroadPhase, Error, FramePlan, Pairs, check_count};
 
 /// The method; see the module.
 #[derive(Debug)]

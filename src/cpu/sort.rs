@@ -103,7 +103,7 @@ fn merge_part(a: &[u64], b: &[u64], first: usize, to: &mut [u64]) {
 mod tests {
     use super::*;
     use crate::cpu::Threads;
-    use crate::splitmix::mix;
+    use crate::mix;
 
     #[test]
     fn keys_are_sorted_on_any_number_of_threads() {

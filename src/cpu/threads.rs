@@ -1,9 +1,8 @@
 //! The thread pools of a registry.
 
-use crate::clock;
 #[cfg(feature = "parallel")]
 use crate::cpu::helpers::Helpers;
-use crate::error::Unavailable;
+use crate::{Unavailable, clock};
 #[cfg(feature = "parallel")]
 use std::{
     collections::BTreeMap,

@@ -16,10 +16,9 @@ mod upkeep;
 mod wear;
 
 use crate::cpu::kernel::bounds::Bounds;
+use crate::cpu::kernel::walk;
 use crate::cpu::{Group, LANES, Marks, Node, Simd, SimdLevel, Walk, Workers, part, prefetch, reserve};
-use crate::filter::Screen;
-use crate::load::{FramePlan, SceneStats};
-use crate::{Aabb, Error, Pairs};
+use crate::{Aabb, Error, FramePlan, Pairs, SceneStats, Screen};
 use curve::Curve;
 use order::Order;
 use renewal::Renewal;
@@ -327,13 +326,13 @@ impl Tree {
     /// Adds part `k` of `parts` of the pairs of its boxes with each other, without those of two passive boxes.
     pub(crate) fn self_pairs(&self, k: usize, parts: usize, pairs: &mut Pairs) {
         // All pairs are found from the leaves with active boxes.
-        self.walk().self_pairs(self.simd, part(self.active, k, parts), pairs);
+        walk::self_pairs(self.simd, &self.walk(), part(self.active, k, parts), pairs);
         self.sweeps.pairs(k, parts, pairs);
     }
 
     /// Adds the pairs of the boxes of a group with those in the tree. None of the group is in the tree.
     pub(crate) fn pairs_with(&self, group: &Group, pairs: &mut Pairs) {
-        self.walk().pairs_with(self.simd, group, pairs);
+        walk::pairs_with(self.simd, &self.walk(), group, pairs);
     }
 
     fn walk(&self) -> Walk<'_> {

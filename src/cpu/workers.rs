@@ -1,7 +1,7 @@
 //! Spreads a frame over threads: phases of independent tasks, each with its own memory.
 
 #[cfg(feature = "parallel")]
-use crate::algorithm::AlgorithmId;
+use crate::AlgorithmId;
 #[cfg(feature = "parallel")]
 use crate::cpu::helpers::Helpers;
 use crate::cpu::{Columns, ColumnsMut, Threads};
@@ -197,9 +197,8 @@ impl Workers {
 #[cfg(all(test, feature = "parallel"))]
 mod tests {
     use super::*;
-    use crate::Pairs;
     use crate::cpu::{METHODS, Simd, SimdLevel};
-    use crate::splitmix::mix;
+    use crate::{Pairs, mix};
     use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
     use std::sync::mpsc;
 

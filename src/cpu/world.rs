@@ -2,8 +2,7 @@
 
 use crate::cpu::kernel::small::{MOST_ROWS, small_world};
 use crate::cpu::{Columns, Members, Simd, Tree, Workers, ensure, order_key, sweep_rows};
-use crate::load::SceneStats;
-use crate::{Aabb, Error, Pairs};
+use crate::{Aabb, Error, Pairs, SceneStats};
 use std::ops::Range;
 
 /// The most boxes of a world that is swept along x. Even if all overlap on x, a sweep takes about as long as a tree.

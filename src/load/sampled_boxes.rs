@@ -1,8 +1,7 @@
 //! A sample of the boxes of a frame.
 
 use super::one_of_each;
-use crate::Aabb;
-use crate::splitmix::mix;
+use crate::{Aabb, mix};
 
 /// Most boxes of a sample. 256 boxes have 32 640 pairs: if 1 % of them overlap on an axis, the sample shows that to
 /// about 10 %.

@@ -84,7 +84,7 @@ impl SceneStats {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::splitmix::mix;
+    use crate::mix;
 
     #[test]
     fn empty_and_invalid_frames_give_zeros() {

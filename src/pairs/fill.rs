@@ -1,9 +1,8 @@
 //! How the built-in algorithms write pairs: in blocks, through the filter, from the lists of their tasks.
 
 use super::Pairs;
-use crate::Error;
 use crate::cpu::Workers;
-use crate::pair::Pair;
+use crate::{Error, Pair};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 

@@ -4,9 +4,8 @@
 //! Within a bucket only the rest of a key counts. It usually has 32 bits, which halves the bytes moved. With several
 //! threads, each first sorts its own share into buckets, and then all shares of a bucket are joined.
 
-use crate::Error;
 use crate::cpu::{Workers, ensure, split};
-use crate::pair::Pair;
+use crate::{Error, Pair};
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// A value that its sort key determines.
@@ -276,7 +275,7 @@ fn sort_bucket<T: Keyed, K: Keyed>(list: &mut [T], rests: &mut [K], mut whole: b
 mod tests {
     use super::*;
     use crate::cpu::Threads;
-    use crate::splitmix::mix;
+    use crate::mix;
 
     fn assert_sorts<T: Keyed + PartialEq>(list: &[T], what: &str) {
         let threads: &[u32] = if cfg!(feature = "parallel") { &[1, 2, 3, 7] } else { &[1] };

@@ -2,8 +2,7 @@
 
 use super::slots::Slots;
 use crate::cpu::{GrownTree, Members, Simd, SimdLevel, Tree, Wear, Workers};
-use crate::load::SceneStats;
-use crate::{Aabb, Error};
+use crate::{Aabb, Error, SceneStats};
 
 /// What it costs to sort a box into a tree, in nodes looked at by queries: 25 and 5 ns on the Zen 3 host of
 /// `datasets/`.

@@ -1,6 +1,5 @@
 use super::*;
-use crate::Ray;
-use crate::error::BoxDefect;
+use crate::{BoxDefect, Ray};
 
 #[test]
 fn bodies_that_are_not_set_rest_and_wake() {

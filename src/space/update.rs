@@ -189,11 +189,7 @@ impl Space {
     fn compare(&mut self) -> Result<(), Error> {
         let Self { slots, keys, before, pairs, begun, ended, .. } = self;
         let handles = |key| handles(slots, key);
-        if let Err(error) = differences(keys, before, handles, begun, ended) {
-            begun.clear();
-            ended.clear();
-            return Err(error);
-        }
+        differences(keys, before, handles, begun, ended)?;
         pairs.extend(keys.iter().copied().map(handles));
         std::mem::swap(keys, before);
         Ok(())

@@ -3,10 +3,9 @@
 //! Algorithms of a method share their [`Work`], and all residuals share their [`Places`]. A file holds each once.
 
 use super::{AlgorithmCost, Crossover, Source, Step, Tuning, TuningError};
-use crate::AlgorithmId;
-use crate::algorithm::Load;
 use crate::cost::{CostTerm, Fallback, Helpers, Places, Residual, Work};
 use crate::tuning::CostCurve;
+use crate::{AlgorithmId, Load};
 use std::sync::Arc;
 
 /// Which algorithm to run under which load.

@@ -1,7 +1,7 @@
 //! Finds where the cheapest algorithm changes along a line of loads.
 
 use super::{AlgorithmCost, Crossover};
-use crate::algorithm::Load;
+use crate::Load;
 use crate::cost::Frame;
 use crate::stats::NORMAL_90;
 

@@ -4,7 +4,7 @@
 //! An expansion of all candidates has a few cache lines, and holds while the load stays near.
 
 use super::AlgorithmCost;
-use crate::algorithm::Load;
+use crate::Load;
 use crate::cost::Frame;
 
 const COORDINATES: usize = 6;

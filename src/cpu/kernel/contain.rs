@@ -2,24 +2,16 @@
 
 use super::{Level, at_level};
 use crate::Aabb;
-use crate::cpu::Simd;
 
 /// Boxes tested together. Eight have 48 bounds: three vectors of 16, or six of eight.
 pub(crate) const BLOCK: usize = 8;
 
-/// Calls `doubtful`, with the position and the outer boxes of the block, for every block of up to [`BLOCK`] boxes of
-/// which one is invalid or reaches out of its outer box. `outer` has the length of `boxes`.
-pub(crate) fn each_doubtful_block(
-    simd: Simd,
-    boxes: &[Aabb],
-    outer: &mut [Aabb],
-    doubtful: impl FnMut(usize, &mut [Aabb]),
-) {
-    at_level!(simd, [] [] blocks(
-        boxes: &[Aabb],
-        outer: &mut [Aabb],
-        doubtful: impl FnMut(usize, &mut [Aabb]),
-    ));
+at_level! {
+    /// Calls `doubtful`, with the position and the outer boxes of the block, for every block of up to [`BLOCK`] boxes
+    /// of which one is invalid or reaches out of its outer box. `outer` has the length of `boxes`.
+    pub(crate) fn each_doubtful_block[] [](
+        boxes: &[Aabb], outer: &mut [Aabb], doubtful: impl FnMut(usize, &mut [Aabb])
+    ) = blocks;
 }
 
 /// Returns whether a box is valid and lies within another: false for NaN.
@@ -49,6 +41,7 @@ fn blocks<L: Level>(boxes: &[Aabb], outer: &mut [Aabb], mut doubtful: impl FnMut
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cpu::Simd;
 
     #[test]
     fn every_level_finds_the_doubtful_blocks() {

@@ -148,7 +148,7 @@ fn union(a: &Membership, b: &Membership) -> Membership {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::splitmix::mix;
+    use crate::mix;
 
     #[test]
     fn lanes_are_tested_as_by_the_filter_and_unions_rule_out_no_pair() {

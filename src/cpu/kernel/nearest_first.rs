@@ -2,7 +2,6 @@
 
 use super::walk::{MOST_LEVELS, Walk};
 use super::{LANES, Level, Node, at_level, prefetch};
-use crate::cpu::Simd;
 use crate::pairs::each_bit;
 
 /// What near and far mean. A lane that contains another has no larger measure.
@@ -39,28 +38,18 @@ impl Open {
     }
 }
 
-impl Walk<'_> {
+at_level! {
     /// Calls `found` for every place in the leaves with a measure of at most `most`, which is the least of its first
     /// value and those that `found` returned. Of the nodes below another, the nearest is visited first.
     #[inline]
-    pub(crate) fn nearest_first(
-        &self,
-        simd: Simd,
-        measure: impl Measure,
-        most: f32,
-        found: impl FnMut(usize, f32) -> f32,
-    ) {
-        let walk = self;
-        at_level!(simd, [] [] Walk::nearest_first_at(
-            walk: &Walk<'_>,
-            measure: impl Measure,
-            most: f32,
-            found: impl FnMut(usize, f32) -> f32,
-        ));
-    }
+    pub(crate) fn nearest_first[] [](
+        walk: &Walk<'_>, measure: impl Measure, most: f32, found: impl FnMut(usize, f32) -> f32
+    ) = Walk::nearest_first;
+}
 
+impl Walk<'_> {
     #[inline(always)]
-    fn nearest_first_at<L: Level>(
+    fn nearest_first<L: Level>(
         &self,
         measure: impl Measure,
         mut most: f32,

@@ -1,7 +1,6 @@
 //! Walks through a tree of nodes: finds the boxes that overlap a box, and the overlapping pairs.
 
 use super::{Baseline, Group, LANES, Level, Marks, Node, Wanted, at_level, prefetch};
-use crate::cpu::Simd;
 use crate::pairs::each_bit;
 use crate::{Aabb, Membership, Pairs};
 use std::ops::Range;
@@ -58,28 +57,24 @@ pub(crate) const SAMPLE: usize = 32;
 /// Levels of a tree of 2^32 boxes.
 pub(super) const MOST_LEVELS: usize = 9;
 
-impl Walk<'_> {
+at_level! {
     /// Calls `found` for every place in the leaves whose box overlaps `b` and, if the tree has marks, is wanted `by`
     /// the box. Returns the number of nodes compared with it.
     #[inline]
-    pub(crate) fn each_overlapping(
-        &self,
-        simd: Simd,
-        b: &Aabb,
-        by: impl FnOnce() -> Membership,
-        found: impl FnMut(usize),
-    ) -> u32 {
-        let walk = self;
-        at_level!(simd, [] [] Walk::each_overlapping_at(
-            walk: &Walk<'_>,
-            b: &Aabb,
-            by: impl FnOnce() -> Membership,
-            found: impl FnMut(usize),
-        ) -> u32)
-    }
+    pub(crate) fn each_overlapping[] [](
+        walk: &Walk<'_>, b: &Aabb, by: impl FnOnce() -> Membership, found: impl FnMut(usize)
+    ) -> u32 = Walk::each_overlapping;
 
+    /// Adds the pairs of the boxes in these leaves with each other and with those in all leaves behind.
+    pub(crate) fn self_pairs[] [](walk: &Walk<'_>, leaves: Range<usize>, pairs: &mut Pairs) = Walk::self_pairs;
+
+    /// Adds the pairs of the boxes of a group with those in the leaves.
+    pub(crate) fn pairs_with[] [](walk: &Walk<'_>, group: &Group, pairs: &mut Pairs) = Walk::pairs_with;
+}
+
+impl Walk<'_> {
     #[inline(always)]
-    fn each_overlapping_at<L: Level>(
+    fn each_overlapping<L: Level>(
         &self,
         b: &Aabb,
         by: impl FnOnce() -> Membership,
@@ -92,34 +87,20 @@ impl Walk<'_> {
         }
     }
 
-    /// Adds the pairs of the boxes in these leaves with each other and with those in all leaves behind.
-    pub(crate) fn self_pairs(&self, simd: Simd, leaves: Range<usize>, pairs: &mut Pairs) {
-        if pairs.is_any_over() {
-            return;
-        }
-        let walk = self;
-        at_level!(simd, [] [] Walk::self_pairs_at(walk: &Walk<'_>, leaves: Range<usize>, pairs: &mut Pairs));
-    }
-
     #[inline(always)]
-    fn self_pairs_at<L: Level>(&self, leaves: Range<usize>, pairs: &mut Pairs, level: L) {
+    fn self_pairs<L: Level>(&self, leaves: Range<usize>, pairs: &mut Pairs, level: L) {
         match self.marks {
+            _ if pairs.is_any_over() => {}
             None => self.leaves_with_all_behind(leaves, unmarked, pairs, level),
             Some(marks) => self.leaves_with_all_behind(leaves, marked(marks), pairs, level),
         }
     }
 
-    /// Adds the pairs of the boxes of a group with those in the leaves.
-    pub(crate) fn pairs_with(&self, simd: Simd, group: &Group, pairs: &mut Pairs) {
+    #[inline(always)]
+    fn pairs_with<L: Level>(&self, group: &Group, pairs: &mut Pairs, level: L) {
         if pairs.is_any_over() {
             return;
         }
-        let walk = self;
-        at_level!(simd, [] [] Walk::pairs_with_at(walk: &Walk<'_>, group: &Group, pairs: &mut Pairs));
-    }
-
-    #[inline(always)]
-    fn pairs_with_at<L: Level>(&self, group: &Group, pairs: &mut Pairs, level: L) {
         let Some(marks) = self.marks else { return self.group_with_all(group, (), unmarked, pairs, level) };
         let of_group = pairs.screen().map_or(Marks::ALL, |screen| Marks::of(&group.ids, &screen.filter));
         self.group_with_all(group, &of_group, marked(marks), pairs, level);
@@ -314,7 +295,8 @@ fn add<W: Wanted, L: Level>(id: u32, others: &[u32; LANES], hits: u32, pairs: &m
 mod tests {
     use super::super::write_each;
     use super::*;
-    use crate::pair::Pair;
+    use crate::Pair;
+    use crate::cpu::Simd;
 
     /// Returns 300 boxes in 19 leaves. The last leaf has empty lanes.
     fn scene() -> (Vec<Aabb>, Vec<Vec<Node>>, Vec<u32>) {
@@ -338,7 +320,7 @@ mod tests {
             let expected: Vec<usize> = (0..boxes.len()).filter(|&k| boxes[k].overlaps(&query)).collect();
             for simd in Simd::every() {
                 let mut found = Vec::new();
-                let looked = walk.each_overlapping(simd, &query, || Membership::ALL, |k| found.push(k));
+                let looked = each_overlapping(simd, &walk, &query, || Membership::ALL, |k| found.push(k));
                 assert_eq!(found, expected, "{simd:?}");
                 assert!(looked >= 2 && looked as usize <= 2 + 19);
             }
@@ -347,18 +329,20 @@ mod tests {
 
     #[test]
     fn every_level_writes_the_pairs_of_any_hits() {
-        fn written<L: Level>(others: &[u32; LANES], hits: u32, level: L) -> [Pair; LANES] {
+        fn write<L: Level>(others: &[u32; LANES], hits: u32, level: L) -> [Pair; LANES] {
             let mut written = [(0, 0); LANES];
             level.write(77, others, hits, &mut written);
             written
+        }
+        at_level! {
+            fn written[] [](others: &[u32; LANES], hits: u32) -> [Pair; LANES] = write;
         }
         let others: [u32; LANES] = std::array::from_fn(|k| 10 * k as u32 + u32::from(k % 3 == 0) * 4_000_000_000);
         for hits in 0..1_u32 << LANES {
             let mut expected = [(0, 0); LANES];
             write_each(77, &others, hits, &mut expected);
             for simd in Simd::every() {
-                let others = &others;
-                let written = at_level!(simd, [] [] written(others: &[u32; LANES], hits: u32) -> [Pair; LANES]);
+                let written = written(simd, &others, hits);
                 let count = hits.count_ones() as usize;
                 assert_eq!(written[..count], expected[..count], "{simd:?} {hits:b}");
             }
@@ -381,7 +365,7 @@ mod tests {
         for simd in Simd::every() {
             let mut found = Pairs::new();
             for leaves in [0..3, 3..4, 4..19] {
-                walk.self_pairs(simd, leaves, &mut found);
+                self_pairs(simd, &walk, leaves, &mut found);
             }
             assert_eq!(found.fingerprint(), expected.fingerprint(), "{simd:?}");
             let apart = [(0..3, 5..6), (2..9, 9..16), (2..4, 18..19)];
@@ -391,10 +375,10 @@ mod tests {
             let mut rest = Pairs::new();
             expected.iter().filter(|&&(i, j)| compared(i, j)).for_each(|&(i, j)| rest.push(i, j));
             found.clear();
-            Walk { apart: &apart, ..walk }.self_pairs(simd, 0..19, &mut found);
+            self_pairs(simd, &Walk { apart: &apart, ..walk }, 0..19, &mut found);
             assert_eq!(found.fingerprint(), rest.fingerprint(), "{simd:?}");
             found.clear();
-            walk.pairs_with(simd, &group, &mut found);
+            pairs_with(simd, &walk, &group, &mut found);
             assert!(
                 found.len() == across && found.iter().all(|&(a, b)| a < 300 && (1000..1015).contains(&b)),
                 "{simd:?}"

@@ -1,9 +1,8 @@
 //! What AVX2 and AVX-512 do in another way than other levels.
 
 use super::{BLOCK, LANES, Level, View};
-use crate::Aabb;
 use crate::cpu::level::{Avx2, Avx512};
-use crate::pair::Pair;
+use crate::{Aabb, Pair};
 use std::arch::x86_64::*;
 use std::mem::offset_of;
 

@@ -1,11 +1,10 @@
 //! A space-filling curve that knows the shapes of boxes.
 
 use super::codes::{hilbert, spread2, spread3};
-use crate::Aabb;
 use crate::cpu::LANES;
 #[cfg(target_arch = "x86_64")]
 use crate::cpu::kernel::corners;
-use crate::load::SceneStats;
+use crate::{Aabb, SceneStats};
 use std::sync::OnceLock;
 
 /// Bits of a cell's number on each axis, and on the axis with the most cells.

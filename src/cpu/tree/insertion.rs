@@ -2,8 +2,7 @@
 
 use super::{NOBODY, Tree, grow};
 use crate::cpu::{LANES, Marks, Node};
-use crate::filter::Screen;
-use crate::{Aabb, Error, Membership};
+use crate::{Aabb, Error, Membership, Screen};
 
 impl Tree {
     /// Adds boxes, which have no bounds yet: to empty lanes near their place on the curve, else to new leaves, whose

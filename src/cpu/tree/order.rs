@@ -3,8 +3,7 @@
 use super::curve::{Curve, Spread};
 use super::{Input, Members};
 use crate::cpu::{LANES, Workers, ensure, order_key, sort};
-use crate::filter::Screen;
-use crate::{Aabb, Error};
+use crate::{Aabb, Error, Screen};
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
@@ -222,8 +221,7 @@ fn each_dense_cell(keys: &[u64], mut found: impl FnMut(Range<usize>)) {
 mod tests {
     use super::*;
     use crate::cpu::Threads;
-    use crate::load::SceneStats;
-    use crate::splitmix::mix;
+    use crate::{SceneStats, mix};
 
     /// Returns a small box in the unit cube, scaled and moved.
     fn at(k: u64, scale: f32, by: [f32; 3]) -> Aabb {

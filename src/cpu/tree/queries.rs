@@ -4,7 +4,9 @@
 
 use super::Tree;
 use crate::cpu::kernel::distance::Distance;
+use crate::cpu::kernel::nearest_first::nearest_first;
 use crate::cpu::kernel::ray::Cast;
+use crate::cpu::kernel::walk::each_overlapping;
 use crate::{Aabb, Membership};
 use std::collections::BinaryHeap;
 
@@ -44,7 +46,7 @@ impl Tree {
         by: impl FnOnce() -> Membership,
         mut found: impl FnMut(u32),
     ) -> u32 {
-        self.walk().each_overlapping(self.simd, bounds, by, |place| found(self.ids[place]))
+        each_overlapping(self.simd, &self.walk(), bounds, by, |place| found(self.ids[place]))
     }
 
     /// Calls `found` with the id of every box that a valid box meets when it moves by `t × motion`, and the least such
@@ -62,7 +64,7 @@ impl Tree {
     #[inline]
     pub fn cast_box(&self, b: &Aabb, motion: [f32; 3], max: f32, mut found: impl FnMut(u32, f32) -> f32) {
         let found = |place: usize, t| found(self.ids[place], t);
-        self.walk().nearest_first(self.simd, Cast::new(b, motion), max.min(f32::MAX), found);
+        nearest_first(self.simd, &self.walk(), Cast::new(b, motion), max.min(f32::MAX), found);
     }
 
     /// Writes the `k` boxes nearest to a point to `nearest`, ascending: of those at a distance of at most
@@ -86,7 +88,7 @@ impl Tree {
         }
         // The farthest is on top.
         let mut heap = BinaryHeap::from(std::mem::take(nearest));
-        self.walk().nearest_first(self.simd, Distance(point), max_distance, |place, distance| {
+        nearest_first(self.simd, &self.walk(), Distance(point), max_distance, |place, distance| {
             if heap.len() < k {
                 heap.extend(name(self.ids[place]).map(|id| Near::new(distance, id)));
             } else if let Some(mut farthest) = heap.peek_mut()

@@ -3,9 +3,7 @@
 use super::curve::Curve;
 use super::{Input, Members, Tree};
 use crate::cpu::{Workers, part};
-use crate::filter::Screen;
-use crate::load::SceneStats;
-use crate::{Aabb, Error};
+use crate::{Aabb, Error, SceneStats, Screen};
 
 /// Steps of a renewal in which codes are made, each for one part of the boxes.
 const RENEWAL_PARTS: usize = 4;

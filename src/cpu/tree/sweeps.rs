@@ -149,9 +149,7 @@ fn begun_within(a: &Walk<'_>, b: &Walk<'_>, axis: usize, most: u64) -> u64 {
 mod tests {
     use super::*;
     use crate::cpu::{Members, Threads, Upkeep, Workers};
-    use crate::load::{FramePlan, SceneStats};
-    use crate::splitmix::mix;
-    use crate::{Filter, Membership};
+    use crate::{Filter, FramePlan, Membership, SceneStats, mix};
 
     /// Returns a rod along x, y or z, or a few times a cube or a sheet, with its centre in a world of edge 100.
     fn long_box(k: u64, length: f32) -> Aabb {

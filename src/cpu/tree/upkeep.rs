@@ -10,8 +10,7 @@ use super::{Input, Members, Tree};
 use crate::clock::{Instant, elapsed_ns};
 use crate::cpu::mean_time::MeanTime;
 use crate::cpu::{Outputs, Workers};
-use crate::load::FramePlan;
-use crate::{Aabb, Error, Pairs};
+use crate::{Aabb, Error, FramePlan, Pairs};
 
 /// Frames in which no refit is tried after one that was in vain, at most.
 const MOST_PAUSE: u32 = 64;

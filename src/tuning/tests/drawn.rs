@@ -1,9 +1,8 @@
 //! Random costs for tests.
 
-use crate::algorithm::Load;
 use crate::cost::{Places, Residual, Work};
-use crate::splitmix;
 use crate::tuning::{AlgorithmCost, CostCurve, CostTerm, Term};
+use crate::{Load, splitmix};
 use std::sync::Arc;
 
 /// Draws from 0 to 1.

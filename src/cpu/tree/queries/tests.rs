@@ -1,7 +1,6 @@
 use super::*;
 use crate::cpu::{Members, Simd, Workers};
-use crate::load::SceneStats;
-use crate::splitmix;
+use crate::{SceneStats, splitmix};
 
 const INF: f32 = f32::INFINITY;
 
