@@ -71,7 +71,8 @@ macro_rules! named {
     };
 }
 
-/// Lets files hold the text of a type, which `Display` writes and `FromStr` reads. A macro of its own, because a `cfg` in a macro asks for the features of the caller.
+/// Lets files hold the text of a type, which `Display` writes and `FromStr` reads. A macro of its own, because a `cfg`
+/// in a macro asks for the features of the caller.
 #[doc(hidden)]
 #[macro_export]
 #[cfg(feature = "serde")]

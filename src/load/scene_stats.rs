@@ -14,8 +14,8 @@ const CLAMP: f64 = 1.0e30;
 /// Statistics of a frame: ranks and counts, which a few boxes anywhere in space don't change.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct SceneStats {
-    /// Start and length of the range in which most centres lie, on each axis: the cells of a grid share it, and those at
-    /// the ends take the boxes beyond.
+    /// Start and length of the range in which most centres lie, on each axis: the cells of a grid share it, and those
+    /// at the ends take the boxes beyond.
     pub ranges: [(f64, f64); 3],
     /// The 0.9 quantile of the extents on each axis.
     pub extent: [f64; 3],

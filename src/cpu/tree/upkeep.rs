@@ -92,8 +92,8 @@ impl Upkeep {
         Ok(updating + searching)
     }
 
-    /// Refits or builds the tree of these boxes. Returns the nanoseconds that this took for each box, without those of a
-    /// refit in vain.
+    /// Refits or builds the tree of these boxes. Returns the nanoseconds that this took for each box, without those of
+    /// a refit in vain.
     ///
     /// # Errors
     /// [`Error::InvalidBox`] for the first invalid box, and [`Error::OutOfMemory`].
