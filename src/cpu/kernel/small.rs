@@ -3,7 +3,7 @@
 use super::rows::Query;
 use super::{Floats, Level, View, at_level};
 use crate::Pairs;
-use crate::cpu::Columns;
+use crate::cpu::{Columns, Simd};
 
 /// The most rows: a bit each in a word.
 pub(crate) const MOST_ROWS: usize = 64;
@@ -15,15 +15,19 @@ const WRITTEN: usize = 8;
 /// many behind them, and no CPU predicts the number.
 const UNASKED: usize = 2;
 
+/// Tests every row against all rows behind it, on all three axes, and adds the pairs. Row k is box `first + k`; there
+/// are at most [`MOST_ROWS`].
+pub(crate) fn small_world(simd: Simd, columns: &Columns, first: u32, pairs: &mut Pairs) {
+    small_at(simd, &View::new(columns), first, pairs);
+}
+
 at_level! {
-    /// Tests every row against all rows behind it, on all three axes, and adds the pairs. Row k is box `first + k`;
-    /// there are at most [`MOST_ROWS`].
-    pub(crate) fn small_world[] [](columns: &Columns, first: u32, pairs: &mut Pairs) = small;
+    #[inline(always)]
+    fn small_at[] [](view: &View<'_>, first: u32, pairs: &mut Pairs) = small;
 }
 
 #[inline(always)]
-fn small<L: Level>(columns: &Columns, first: u32, pairs: &mut Pairs, level: L) {
-    let view = &View::new(columns);
+fn small<L: Level>(view: &View<'_>, first: u32, pairs: &mut Pairs, level: L) {
     let mut hits = [0; MOST_ROWS];
     let hits = &mut hits[..view.len];
     for at in (0..view.len).step_by(L::Rows::COUNT) {
