@@ -2,6 +2,7 @@
 
 use crate::cuts::{Cuts, centre};
 use sapwise::Aabb;
+use sapwise::internals::splitmix;
 
 /// One box that stands for several.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,7 +38,7 @@ impl Sample {
         let take = |k: usize| {
             let (first, end) = (start(k), start(k + 1));
             // Not at regular distances, at which boxes of one kind may lie.
-            let at = first + (mix(k as u64) % (end - first) as u64) as usize;
+            let at = first + (splitmix::next(&mut (k as u64)) % (end - first) as u64) as usize;
             let bounds = boxes[at];
             let cost = 1.0 + pair_cost * f64::from(pairs_of(at)) / 2.0;
             let weight = ((end - first) as f64 * cost * Self::UNIT as f64).clamp(1.0, 1e15) as u64;
@@ -61,14 +62,6 @@ impl Sample {
             s.weight = (s.weight as f64 * cost).clamp(1.0, 1e15) as u64;
         }
     }
-}
-
-/// The finaliser of splitmix64 (Steele, Lea and Flood, 2014).
-fn mix(mut x: u64) -> u64 {
-    x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ (x >> 31)
 }
 
 #[cfg(test)]

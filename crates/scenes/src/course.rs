@@ -1,43 +1,39 @@
 //! Courses: scenes whose load changes from one frame to the next, as in games.
 
 use crate::Scenario;
+use sapwise::named;
 
-/// A scene of which a frame may have fewer boxes, and which may make several steps a frame.
-///
-/// ```
-/// use sapwise_scenes::Course;
-///
-/// let course = Course::Fight;
-/// let mut scene = course.scenario().start(1000, 1);
-/// for frame in 0..250 {
-///     let boxes = &scene.boxes()[..course.boxes(frame, 1000)];
-///     assert_eq!(boxes.len(), 1000);
-///     (0..course.steps(frame)).for_each(|_| scene.advance());
-/// }
-/// assert_eq!(scene.frame(), 200 + 50 * 12);
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Course {
-    /// A menu of 40 boxes for 150 frames, then the level.
-    Level,
-    /// For 200 frames in the middle all goes twelve times as fast.
-    Fight,
-    /// Every 50 frames half of the objects leave or come back.
-    Pooled,
+named! {
+    /// A scene of which a frame may have fewer boxes, and which may make several steps a frame.
+    ///
+    /// ```
+    /// use sapwise_scenes::Course;
+    ///
+    /// let course = Course::Fight;
+    /// let mut scene = course.scenario().start(1000, 1);
+    /// for frame in 0..250 {
+    ///     let boxes = &scene.boxes()[..course.boxes(frame, 1000)];
+    ///     assert_eq!(boxes.len(), 1000);
+    ///     (0..course.steps(frame)).for_each(|_| scene.advance());
+    /// }
+    /// assert_eq!(scene.frame(), 200 + 50 * 12);
+    /// ```
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub enum Course("course") {
+        /// A menu of 40 boxes for 150 frames, then the level.
+        Level = "level",
+        /// For 200 frames in the middle all goes twelve times as fast.
+        Fight = "fight",
+        /// Every 50 frames half of the objects leave or come back.
+        Pooled = "pooled",
+    }
 }
 
 impl Course {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Level, Self::Fight, Self::Pooled];
-
     /// Its name, and that of its file.
     #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Level => "level",
-            Self::Fight => "fight",
-            Self::Pooled => "pooled",
-        }
+    pub const fn name(self) -> &'static str {
+        self.as_str()
     }
 
     /// The scenario of its boxes.

@@ -55,4 +55,4 @@ mod scenario;
 pub use course::Course;
 pub use frames::{FrameWriter, Frames, FramesError, InvalidFrame, NpyError, write_pairs};
 pub use random::Random;
-pub use scenario::{Scenario, Scene, UnknownScenario};
+pub use scenario::{Scenario, Scene};

@@ -1,5 +1,7 @@
 //! Random numbers from a seed.
 
+use sapwise::internals::splitmix;
+
 /// A random number generator: splitmix64 of Steele, Lea and Flood (2014). A seed gives the same numbers on every
 /// platform.
 ///
@@ -37,11 +39,7 @@ impl Random {
 
     /// Returns 64 random bits.
     pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut x = self.0;
-        x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        x ^ (x >> 31)
+        splitmix::next(&mut self.0)
     }
 
     /// Returns `0..count` in random order (Fisher and Yates). Draws nothing for 0 and 1.
