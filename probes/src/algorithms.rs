@@ -5,6 +5,7 @@ use sapwise::algorithm::{Backend, BackendClass};
 use sapwise::tuning::Term;
 use sapwise::{AlgorithmId, BroadPhase, Error, Registry};
 use sapwise_tune::model::Scale;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// Creates an instance of a user's algorithm on a number of threads.
@@ -108,9 +109,7 @@ impl Algorithms {
     /// Makes a registry with the library's algorithms on 1, 2, 4, ... and `cores` threads, then the user's.
     pub(crate) fn registry(&self, cores: u32) -> Registry {
         let mut registry = Registry::with_cores(cores);
-        let mut counts: Vec<u32> = registry.available().iter().map(|e| e.id.threads()).collect();
-        counts.sort_unstable();
-        counts.dedup();
+        let counts: BTreeSet<u32> = registry.available().iter().map(|e| e.id.threads()).collect();
         for user in &self.users {
             for &threads in counts.iter().filter(|&&k| k == 1 || user.parallel) {
                 // The name was accepted on one thread, and the counts are those of ids.

@@ -2,6 +2,7 @@
 
 use crate::interrupt;
 use anyhow::Context;
+use serde::de::DeserializeOwned;
 use std::ffi::OsString;
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -38,6 +39,20 @@ pub(crate) fn run_part(
 ) -> anyhow::Result<Ended> {
     let mut command = own_program()?;
     run(command.arg("part").args(arguments), limit, Duration::ZERO, on_line, &mut || {})
+}
+
+/// Runs a part and returns what it prints as JSON, one value a line.
+///
+/// # Errors
+/// When the process can't be started.
+pub(crate) fn answers<T: DeserializeOwned>(arguments: &[&str], limit: Duration) -> anyhow::Result<(Vec<T>, Ended)> {
+    let mut answers = Vec::new();
+    let ended = run_part(arguments, limit, &mut |line| {
+        // Drivers print what they like on the standard output of whoever loads them.
+        answers.extend(serde_json::from_str::<T>(line));
+        Ok(())
+    })?;
+    Ok((answers, ended))
 }
 
 /// Runs another `sapwise` with these arguments, which must make it [`stop_with_parent`], and these environment

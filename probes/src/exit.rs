@@ -1,6 +1,5 @@
 //! Exit statuses: 0 done, 1 failed, 2 wrong usage, 128 plus the number of a signal that asked the program to stop.
 
-use std::fmt;
 use std::process::ExitCode;
 
 /// How a verb ended that has printed its answer.
@@ -13,16 +12,9 @@ pub(crate) enum Outcome {
 }
 
 /// A command line or an environment that can't be followed. Exit status 2.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
 pub(crate) struct WrongUsage(pub(crate) String);
-
-impl fmt::Display for WrongUsage {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl std::error::Error for WrongUsage {}
 
 /// Prints the error, if there is one, and returns the exit status.
 pub(crate) fn report(result: anyhow::Result<Outcome>) -> ExitCode {

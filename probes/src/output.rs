@@ -1,19 +1,13 @@
 //! Standard output and standard error, without the panics of `println!`.
 
-use std::fmt;
+use crate::exit::Outcome;
+use serde::Serialize;
 use std::io::{ErrorKind, Write};
 
 /// Standard output is closed. A broken pipe elsewhere, such as one given to `--out`, is an ordinary error.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
+#[error("standard output is closed")]
 struct Closed;
-
-impl fmt::Display for Closed {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("standard output is closed")
-    }
-}
-
-impl std::error::Error for Closed {}
 
 /// Writes a text and a line end to standard output.
 ///
@@ -37,8 +31,21 @@ pub(crate) fn refused(error: std::io::Error) -> anyhow::Error {
 ///
 /// # Errors
 /// As [`print()`].
-pub(crate) fn print_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
+pub(crate) fn print_json(value: &impl Serialize) -> anyhow::Result<()> {
     print(&serde_json::to_string(value)?)
+}
+
+/// Prints the answer of a verb: as JSON, or as its text.
+///
+/// # Errors
+/// As [`print()`].
+pub(crate) fn answer(json: bool, answer: &impl Serialize, text: impl FnOnce() -> String) -> anyhow::Result<Outcome> {
+    if json {
+        print_json(answer)?
+    } else {
+        print(&text())?
+    }
+    Ok(Outcome::Done)
 }
 
 /// Writes the JSON text of a file as one line to standard output.

@@ -4,6 +4,7 @@ use sapwise::algorithm::BackendClass;
 use sapwise::{AlgorithmId, Registry, Tuning};
 use sapwise_lab::Report;
 use sapwise_tune::{GpuIdentity, GpuKind, Model};
+use std::collections::BTreeSet;
 
 /// Returns why the timings of a report do not hold for this build, one sentence for each method.
 pub(crate) fn stale_in_report(report: &Report, registry: &Registry) -> Vec<String> {
@@ -38,32 +39,26 @@ fn name((class, method): Key<'_>) -> String {
 
 /// Returns the methods whose revision is not that of this build, one sentence for each.
 pub(crate) fn stale<'a>(used: impl Iterator<Item = (Key<'a>, u32)>, registry: &Registry) -> Vec<String> {
-    // A revision on GPUs is the same on every GPU, and known without any.
-    let on_gpus = sapwise_gpu::algorithms(std::iter::once(&any_gpu()));
-    let mut stale = Vec::new();
-    for ((class, method), revision) in used {
-        let name = name((class, method));
-        // A method has one revision on every number of threads.
-        let own = registry.entries().iter().find(|e| of(&e.id) == (class, method)).map(|e| e.revision);
-        let ours = own.or_else(|| on_gpus.iter().find(|e| of(&e.id) == (class, method)).map(|e| e.revision));
-        match ours {
-            Some(ours) if ours == revision => {}
-            Some(ours) => stale.push(format!("{name} has revision {revision} there and {ours} in this build")),
-            None => stale.push(format!("{name} {ELSEWHERE}")),
-        }
-    }
-    stale.sort_unstable();
-    stale.dedup();
-    stale
+    let sentence = |(key, there): (Key<'a>, u32)| match revision(key, registry) {
+        Some(ours) if ours == there => None,
+        Some(ours) => Some(format!("{} has revision {there} there and {ours} in this build", name(key))),
+        None => Some(format!("{} {ELSEWHERE}", name(key))),
+    };
+    let stale: BTreeSet<String> = used.filter_map(sentence).collect();
+    stale.into_iter().collect()
 }
 
 /// Returns whether this build has a method on that class of processor.
 pub(crate) fn is_known(key: Key<'_>, registry: &Registry) -> bool {
-    let on_gpus = sapwise_gpu::algorithms(std::iter::once(&any_gpu()));
-    registry.entries().iter().any(|e| of(&e.id) == key) || on_gpus.iter().any(|e| of(&e.id) == key)
+    revision(key, registry).is_some()
 }
 
-/// A GPU for asking which algorithms there are.
+/// Returns the revision of a method, which is one on every number of threads, and on every GPU, known without any.
+fn revision(key: Key<'_>, registry: &Registry) -> Option<u32> {
+    let on_gpus = sapwise_gpu::algorithms(std::iter::once(&any_gpu()));
+    registry.entries().iter().chain(&on_gpus).find(|e| of(&e.id) == key).map(|e| e.revision)
+}
+
 fn any_gpu() -> GpuIdentity {
     GpuIdentity::new(0, "", GpuKind::Other)
 }

@@ -11,7 +11,7 @@ use sapwise_lab::data::usual_scenario;
 use sapwise_lab::fit::measured_tuning;
 use sapwise_lab::label_text;
 use sapwise_lab::report::{Label, Report};
-use sapwise_lab::text::{columns, count, grouped};
+use sapwise_lab::text::{columns, count, grouped, once};
 use sapwise_tune::hardware::{ParameterId, with_unit};
 use sapwise_tune::{GpuHardware, GpuIdentity, Hardware, How, Model, Parameter};
 use std::path::Path;
@@ -20,7 +20,7 @@ use std::path::Path;
 pub(crate) fn report(report: &Report, terminal: Terminal) -> String {
     let mut text = hardware(&report.hardware, terminal);
     let base = Model::built_in().ok();
-    for scenario in scenarios(report) {
+    for scenario in once(report.points.iter().map(|p| p.scenario.as_str())) {
         match measured_tuning(report, scenario, base.as_ref()) {
             Ok(measured) => text.push_str(&format!("\n{}", tuning(&measured, terminal))),
             Err(why) => text.push_str(&format!("\n{scenario}: no tuning: {why:#}\n")),
@@ -166,14 +166,4 @@ fn steps(tuning: &Tuning, terminal: Terminal, all: bool) -> String {
     let with = if tuning.crossovers.iter().any(told) { ", with 90 % intervals" } else { "" };
     let head = format!("Fastest by number of objects in the scenario {}{with}", tuning.scenario);
     format!("{}\n{}", terminal.head(&head), columns(&rows))
-}
-
-fn scenarios(report: &Report) -> Vec<&str> {
-    let mut names: Vec<&str> = Vec::new();
-    for point in &report.points {
-        if !names.contains(&point.scenario.as_str()) {
-            names.push(&point.scenario);
-        }
-    }
-    names
 }

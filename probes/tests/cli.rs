@@ -25,16 +25,15 @@ fn wrong_usage_is_exit_status_two() {
         &["probe", "--hardware-only", "--quick"],
     ];
     for words in cases {
-        failure(sapwise().args(words), 2);
+        failure(sapwise().args(words), 2, &[]);
     }
-    assert!(failure(sapwise().args(["probe", "--scenario", "nowhere"]), 2).contains("uniform"));
+    failure(sapwise().args(["probe", "--scenario", "nowhere"]), 2, &["uniform"]);
 }
 
 #[test]
 fn a_wrong_simd_level_is_refused_by_every_verb() {
     for words in [&["devices"][..], &["check", "x.json"], &["probe"], &["pairs", "x.npy"], &["schema", "--out", "x"]] {
-        let complaint = failure(sapwise().env("SAPWISE_SIMD", "sse9").args(words), 2);
-        assert!(complaint.contains("SAPWISE_SIMD=sse9"), "{complaint}");
+        failure(sapwise().env("SAPWISE_SIMD", "sse9").args(words), 2, &["SAPWISE_SIMD=sse9"]);
     }
     success(sapwise().env("SAPWISE_SIMD", "portable").arg("devices"));
 }
@@ -115,9 +114,8 @@ fn bad_boxes_are_told_with_file_frame_and_position() {
         (folder.path().join("absent.npy"), &[], &["absent.npy"]),
     ];
     for (file, options, expected) in cases {
-        let complaint = failure(sapwise().arg("pairs").arg(&file).args(options), 1);
+        let complaint = failure(sapwise().arg("pairs").arg(&file).args(options), 1, expected);
         assert!(complaint.starts_with("error: "), "{complaint}");
-        expected.iter().for_each(|text| assert!(complaint.contains(text), "{text} is missing: {complaint}"));
     }
 }
 
@@ -130,9 +128,9 @@ fn an_unknown_algorithm_is_wrong_usage_and_names_the_known() {
         ("brute@gpu99", "this machine has no gpu99"),
         ("brute@cpu4096", "`sapwise devices` lists what can"),
     ] {
-        let complaint = failure(sapwise().arg("pairs").arg(&boxes).args(["--algorithm", id]), 2);
+        let complaint = failure(sapwise().arg("pairs").arg(&boxes).args(["--algorithm", id]), 2, &[told]);
         // No advice that only a program can follow.
-        assert!(complaint.contains(told) && !complaint.contains("Registry"), "{complaint}");
+        assert!(!complaint.contains("Registry"), "{complaint}");
     }
 }
 
@@ -142,12 +140,9 @@ fn an_output_that_can_not_be_written_is_a_failure_that_names_it() {
     let boxes = npy(folder.path(), "boxes.npy", "<f4", "1, 6", &[0.0; 6]);
     // Not even a superuser can create a folder below a file.
     let out = boxes.join("pairs.npy");
-    let complaint = failure(sapwise().arg("pairs").arg(&boxes).arg("--out").arg(&out), 1);
-    assert!(complaint.contains("pairs.npy"), "{complaint}");
-    let complaint = failure(sapwise().args(["schema", "--out"]).arg(&out), 1);
-    assert!(complaint.contains("pairs.npy"), "{complaint}");
-    let complaint = failure(sapwise().args(["schema", "--out"]).arg(&boxes), 1);
-    assert!(complaint.contains("boxes.npy is a file; name a folder"), "{complaint}");
+    failure(sapwise().arg("pairs").arg(&boxes).arg("--out").arg(&out), 1, &["pairs.npy"]);
+    failure(sapwise().args(["schema", "--out"]).arg(&out), 1, &["pairs.npy"]);
+    failure(sapwise().args(["schema", "--out"]).arg(&boxes), 1, &["boxes.npy is a file; name a folder"]);
 }
 
 #[cfg(target_os = "linux")]
@@ -155,8 +150,7 @@ fn an_output_that_can_not_be_written_is_a_failure_that_names_it() {
 fn a_full_disk_is_a_failure_and_a_closed_pipe_is_none() {
     let folder = tempfile::tempdir().unwrap();
     let boxes = npy(folder.path(), "boxes.npy", "<f4", "1, 6", &[0.0; 6]);
-    let complaint = failure(sapwise().arg("pairs").arg(&boxes).args(["--out", "/dev/full"]), 1);
-    assert!(complaint.contains("/dev/full"), "{complaint}");
+    failure(sapwise().arg("pairs").arg(&boxes).args(["--out", "/dev/full"]), 1, &["/dev/full"]);
     let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
     let ended = program().arg("devices").stdout(full).output().unwrap();
     assert_eq!(ended.status.code(), Some(1));
@@ -203,10 +197,8 @@ fn a_file_that_cannot_be_written_is_told_first() {
     let commands: [&[&str]; 3] =
         [&["train", report, "--out"], &["predict", "--report", report, "--out"], &["run", "uniform", "--record"]];
     for words in commands {
-        let complaint = failure(sapwise().args(words).arg(&below_a_file), 1);
-        assert!(complaint.contains("out.json") && complaint.contains("can't be made"), "{words:?}: {complaint}");
-        let complaint = failure(sapwise().args(words).arg(folder.path()), 1);
-        assert!(complaint.contains("is a folder"), "{words:?}: {complaint}");
+        failure(sapwise().args(words).arg(&below_a_file), 1, &["out.json", "can't be made"]);
+        failure(sapwise().args(words).arg(folder.path()), 1, &["is a folder"]);
     }
 }
 

@@ -86,9 +86,8 @@ fn a_measured_tuning_comes_from_the_report_alone() {
     let tuning = answer(&mut measured(&["--json"]));
     assert_tuning(&tuning, "measured");
     assert_eq!(tuning["model"], Value::Null);
-    let complaint = failure(&mut measured(&["--scenario", "gravity"]), 1);
-    assert!(complaint.contains("gravity") && complaint.contains("it holds: "), "{complaint}");
-    failure(sapwise().args(["predict", "--measured"]), 2);
+    failure(&mut measured(&["--scenario", "gravity"]), 1, &["gravity", "it holds: "]);
+    failure(sapwise().args(["predict", "--measured"]), 2, &[]);
 }
 
 #[test]
@@ -96,8 +95,7 @@ fn train_refuses_timings_of_an_unoptimised_build() {
     let folder = tempfile::tempdir().unwrap();
     let debug = report(folder.path(), "debug.json", &[("/provenance/optimised", false.into())]);
     let model = folder.path().join("model.json");
-    let complaint = failure(sapwise().arg("train").arg(debug).arg("--out").arg(&model), 1);
-    assert!(complaint.contains("debug.json") && complaint.contains("unoptimised"), "{complaint}");
+    failure(sapwise().arg("train").arg(debug).arg("--out").arg(&model), 1, &["debug.json", "unoptimised"]);
     assert!(!model.exists());
 }
 
@@ -135,10 +133,8 @@ fn run_refuses_tunings_and_reports_of_other_revisions() {
     let stale = folder.path().join("stale.json");
     fs::write(&stale, tuning.to_string()).unwrap();
     for (file, name) in [(&old, "old.json"), (&stale, "stale.json")] {
-        let complaint = failure(sapwise().args(["run", "uniform", "--tuning"]).arg(file), 1);
-        for text in [name, "brute", "999999", "probe again"] {
-            assert!(complaint.contains(text), "{text} is missing: {complaint}");
-        }
+        let texts = [name, "brute", "999999", "probe again"];
+        failure(sapwise().args(["run", "uniform", "--tuning"]).arg(file), 1, &texts);
     }
 }
 

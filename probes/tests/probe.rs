@@ -2,9 +2,9 @@
 
 mod common;
 
-#[cfg(all(unix, feature = "long-tests"))]
-use common::{TERMINATED, program, send};
 use common::{failure, sapwise, success};
+#[cfg(all(unix, feature = "long-tests"))]
+use common::{interrupt_when, program, send};
 use sapwise_lab::report::Report;
 use sapwise_tune::ParameterId;
 use std::fs;
@@ -62,36 +62,19 @@ fn a_folder_that_takes_no_file_is_told_before_measuring() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("file");
     fs::write(&file, "").unwrap();
-    let complaint = failure(sapwise().args(TINY).arg("--out").arg(file.join("report.json")), 1);
-    assert!(complaint.contains("--out"), "{complaint}");
+    failure(sapwise().args(TINY).arg("--out").arg(file.join("report.json")), 1, &["--out"]);
 }
 
 #[cfg(all(target_os = "linux", feature = "long-tests"))]
 #[test]
 fn a_full_disk_keeps_the_report_in_the_folder_for_temporary_files() {
     let folder = tempfile::tempdir().unwrap();
-    let complaint = failure(sapwise().env("TMPDIR", folder.path()).args(TINY).args(["--out", "/dev/full"]), 1);
-    assert!(complaint.contains("/dev/full"), "{complaint}");
+    let complaint =
+        failure(sapwise().env("TMPDIR", folder.path()).args(TINY).args(["--out", "/dev/full"]), 1, &["/dev/full"]);
     let kept: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().path()).collect();
     assert_eq!(kept.len(), 1, "{kept:?}");
     assert!(complaint.contains(&*kept[0].to_string_lossy()), "{complaint}");
     assert!(read(&kept[0]).points.len() >= 2);
-}
-
-/// A probe of all scenarios that has written what it has for the first time, and goes on.
-#[cfg(all(unix, feature = "long-tests"))]
-fn under_way(out: &Path) -> std::process::Child {
-    let mut probe = program();
-    probe.args(["probe", "--max-objects", "30"]).arg("--out").arg(out);
-    for scenario in sapwise_scenes::Scenario::ALL {
-        probe.args(["--scenario", scenario.name()]);
-    }
-    let mut probe = probe.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::piped()).spawn().unwrap();
-    while !out.with_added_extension("unfinished").exists() {
-        assert_eq!(probe.try_wait().unwrap(), None, "the probe ended before its first scenario did");
-        std::thread::sleep(std::time::Duration::from_millis(5));
-    }
-    probe
 }
 
 #[cfg(all(unix, feature = "long-tests"))]
@@ -104,12 +87,13 @@ fn an_interrupt_keeps_what_was_measured_and_leaves_a_report_that_is_there() {
         if let Some(text) = before {
             fs::write(&out, text).unwrap();
         }
-        let probe = under_way(&out);
-        send("-TERM", &probe);
-        let ended = probe.wait_with_output().unwrap();
-        let complaint = String::from_utf8_lossy(&ended.stderr).into_owned();
-        assert_eq!(ended.status.code(), Some(TERMINATED), "{complaint}");
-        assert!(complaint.contains(&format!("error: interrupted: {} holds", kept.display())), "{complaint}");
+        let mut probe = program();
+        probe.args(["probe", "--max-objects", "30"]).arg("--out").arg(&out);
+        for scenario in sapwise_scenes::Scenario::ALL {
+            probe.args(["--scenario", scenario.name()]);
+        }
+        let holds = format!("error: interrupted: {} holds", kept.display());
+        interrupt_when(&mut probe, || out.with_added_extension("unfinished").exists(), &holds);
         let report = read(kept);
         assert!(!report.points.is_empty());
         assert!(report.remarks.iter().any(|r| r.starts_with("interrupted after ")), "{:?}", report.remarks);

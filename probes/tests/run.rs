@@ -3,7 +3,7 @@
 mod common;
 
 #[cfg(unix)]
-use common::{TERMINATED, program, send};
+use common::{TERMINATED, interrupt_when, program, send};
 use common::{answer, failure, npy, sapwise, success, tuning};
 use serde_json::{Value, json};
 use std::fs;
@@ -172,15 +172,12 @@ fn what_can_not_be_run_is_refused_with_what_to_do() {
         ("uniform".into(), &["--plot", "a.pdf"], 2, &["a.pdf", ".svg"]),
     ];
     for (scene, words, status, needed) in cases {
-        let complaint = failure(&mut run(&scene, &tuning, words), status);
-        assert!(needed.iter().all(|text| complaint.contains(text)), "{scene:?} {words:?}: {complaint}");
+        failure(&mut run(&scene, &tuning, words), status, needed);
     }
     let nowhere = folder.path().join("steps.json").join("a.svg");
-    let complaint = failure(run("uniform", &tuning, &[]).arg("--plot").arg(&nowhere), 1);
-    assert!(complaint.contains("a.svg") && complaint.contains("can't be made"), "{complaint}");
-    failure(&mut run("uniform", &tuning, &["--trace", "a.txt"]), 2);
-    let complaint = failure(run(&scene, &tuning, &[]).arg("--trace").arg(folder.path().join("steps.json")), 2);
-    assert!(complaint.contains("steps.json"), "{complaint}");
+    failure(run("uniform", &tuning, &[]).arg("--plot").arg(&nowhere), 1, &["a.svg", "can't be made"]);
+    failure(&mut run("uniform", &tuning, &["--trace", "a.txt"]), 2, &[]);
+    failure(run(&scene, &tuning, &[]).arg("--trace").arg(folder.path().join("steps.json")), 2, &["steps.json"]);
 }
 
 #[cfg(unix)]
@@ -228,14 +225,6 @@ fn a_recording_that_was_made_before_the_interrupt_is_told() {
     let words = ["--objects", "8000", "--frames", "300"];
     let mut command = program();
     command.args(["run", "uniform", "--tuning"]).arg(&tuning).args(words).arg("--record").arg(&recording);
-    let mut child = command.stderr(std::process::Stdio::piped()).spawn().unwrap();
-    while !recording.exists() {
-        assert!(child.try_wait().unwrap().is_none(), "it ended before it had recorded");
-        std::thread::sleep(std::time::Duration::from_millis(20));
-    }
-    send("-TERM", &child);
-    let ended = child.wait_with_output().unwrap();
-    let complaint = String::from_utf8_lossy(&ended.stderr).into_owned();
-    assert_eq!(ended.status.code(), Some(TERMINATED), "{complaint}");
-    assert!(complaint.contains("r.npy holds the whole recording: interrupted"), "{complaint}");
+    let complaint = "r.npy holds the whole recording: interrupted";
+    interrupt_when(&mut command, || recording.exists(), complaint);
 }

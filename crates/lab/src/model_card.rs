@@ -7,7 +7,7 @@ use sapwise::algorithm::BackendClass;
 use sapwise_tune::Model;
 use sapwise_tune::hardware::with_unit;
 use sapwise_tune::model::MethodModel;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Method and use, the same for every model.
 const USE: &str = "
@@ -97,9 +97,8 @@ fn gpus(methods: &[&MethodModel]) -> String {
     if methods.is_empty() {
         return NO_GPUS.to_owned();
     }
-    let mut kinds: Vec<String> = methods.iter().flat_map(|m| &m.gpu_kinds).map(ToString::to_string).collect();
-    kinds.sort_unstable();
-    kinds.dedup();
+    let kinds: BTreeSet<&str> = methods.iter().flat_map(|m| &m.gpu_kinds).map(|kind| kind.as_str()).collect();
+    let kinds = Vec::from_iter(kinds);
     let most = methods.iter().map(|m| m.max_threads).max().unwrap_or(1);
     format!("{GPUS}\nKinds of GPU in the training: {}; at most {most} together.\n", kinds.join(", "))
 }

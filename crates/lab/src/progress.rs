@@ -5,42 +5,32 @@
 #[error("interrupted before the end; there is no result")]
 pub struct Interrupted;
 
-/// Receives the progress of long work. Work of several parts starts each with its own number of steps. [`Silent`]
-/// ignores all of it.
+/// Receives the progress of long work, and ignores what it does not define. Work of several parts starts each with its
+/// own number of steps.
 pub trait Progress: Sync {
-    /// Begins a part of `steps` steps.
-    fn start(&self, steps: u64);
+    /// Begins a part of that many steps.
+    fn start(&self, _steps: u64) {}
 
-    /// Adds `steps` finished steps of the part. Called from several threads.
-    fn advance(&self, steps: u64);
+    /// Adds finished steps of the part. Called from several threads.
+    fn advance(&self, _steps: u64) {}
 
     /// Says what the work is doing.
-    fn message(&self, text: &str);
+    fn message(&self, _text: &str) {}
 
     /// Warns the user; the work goes on. Called from several threads.
-    fn warn(&self, text: &str);
+    fn warn(&self, _text: &str) {}
 
     /// Asks between steps whether to go on.
     ///
     /// # Errors
     /// When the user asked to stop.
-    fn check(&self) -> Result<(), Interrupted>;
+    fn check(&self) -> Result<(), Interrupted> {
+        Ok(())
+    }
 }
 
 /// Ignores all progress and is never interrupted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Silent;
 
-impl Progress for Silent {
-    fn start(&self, _: u64) {}
-
-    fn advance(&self, _: u64) {}
-
-    fn message(&self, _: &str) {}
-
-    fn warn(&self, _: &str) {}
-
-    fn check(&self) -> Result<(), Interrupted> {
-        Ok(())
-    }
-}
+impl Progress for Silent {}

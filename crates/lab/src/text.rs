@@ -17,6 +17,17 @@ pub fn columns(rows: &[Vec<String>]) -> String {
     text
 }
 
+/// Each of some values once, in the order of the first.
+pub fn once<T: PartialEq>(values: impl IntoIterator<Item = T>) -> Vec<T> {
+    let mut known = Vec::new();
+    for value in values {
+        if !known.contains(&value) {
+            known.push(value);
+        }
+    }
+    known
+}
+
 /// A number of things, with the plural of their name but for one.
 pub fn count(number: usize, thing: &str) -> String {
     format!("{number} {thing}{}", if number == 1 { "" } else { "s" })
@@ -53,6 +64,11 @@ mod tests {
     fn columns_are_aligned_without_trailing_blanks() {
         let rows = [vec!["a".to_owned(), "long".to_owned(), "x".to_owned()], vec!["bcd".to_owned(), "e".to_owned()]];
         assert_eq!(columns(&rows), "a    long  x\nbcd  e\n");
+    }
+
+    #[test]
+    fn values_are_kept_once_in_the_order_of_the_first() {
+        assert_eq!(once([3, 1, 3, 2, 1]), [3, 1, 2]);
     }
 
     #[test]

@@ -16,7 +16,7 @@ use sapwise::internals::Places;
 use sapwise::tuning::Term;
 use std::sync::Arc;
 
-pub use error::{ModelError, PredictError};
+pub use error::PredictError;
 pub use helpers::{HelpersModel, ThreadFigures};
 pub use predict::Prediction;
 pub use residual::GroupResidual;
@@ -203,7 +203,7 @@ impl Model {
 
     /// Returns what makes this model unusable, if anything.
     #[must_use]
-    pub fn defect(&self) -> Option<ModelError> {
+    pub fn defect(&self) -> Option<String> {
         let places = self.places.loads();
         let is_wrong = |r: &&Range| !(r.min.is_finite() && r.max.is_finite() && r.min <= r.max);
         let of_method = |m: &MethodModel| {
@@ -211,7 +211,7 @@ impl Model {
                 m.fallback.as_ref().and_then(|f| self.fallback_defect(m, f)).or_else(|| m.defect(places.len()))?;
             Some(format!("{} on the {}: {why}", m.method, m.backend))
         };
-        let what = if self.methods.is_empty() {
+        if self.methods.is_empty() {
             Some("it holds no method".to_owned())
         } else if let Some(r) = self.ranges.iter().find(is_wrong) {
             Some(format!("the range of {} has ends that are not finite or not ascending", r.parameter))
@@ -221,8 +221,7 @@ impl Model {
             Some(format!("places[{position}] is a load that is negative or not finite"))
         } else {
             self.methods.iter().find_map(of_method)
-        };
-        what.map(ModelError)
+        }
     }
 
     fn fallback_defect(&self, of: &MethodModel, FallbackModel { method, factor }: &FallbackModel) -> Option<String> {

@@ -11,12 +11,6 @@ pub(crate) struct Part {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum PartKind {
-    /// Prints the parameters of one family as JSON, for `tools/compare-hardware.sh`.
-    Hardware {
-        family: String,
-        #[arg(long)]
-        threads: Option<u32>,
-    },
     /// Prints the GPUs, one as JSON a line.
     Gpus,
     /// Prints the algorithms on all GPUs, one as JSON a line.

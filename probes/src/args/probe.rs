@@ -3,6 +3,7 @@
 use super::known;
 use crate::gpus::GpuChoice;
 use clap::Args;
+use sapwise_lab::text::once;
 use sapwise_scenes::Scenario;
 use std::path::PathBuf;
 
@@ -62,7 +63,6 @@ pub(crate) struct Probe {
 impl Probe {
     /// Returns the scenarios that are asked for, each once.
     pub(crate) fn scenarios(&self) -> Vec<Scenario> {
-        let mut seen = Vec::new();
-        self.scenarios.iter().copied().filter(|s| !seen.contains(s) && (seen.push(*s), true).1).collect()
+        once(self.scenarios.iter().copied())
     }
 }

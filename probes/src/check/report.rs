@@ -9,6 +9,7 @@ use sapwise_tune::hardware::ParameterId;
 use sapwise_tune::measure::Watch;
 use sapwise_tune::stats::median;
 use sapwise_tune::{GpuHardware, Hardware};
+use std::collections::BTreeSet;
 
 /// Several threads may be up to this factor faster than their number, by a clock that rises between two measurements.
 /// Above it, other programs disturbed the measurement of one thread.
@@ -54,9 +55,7 @@ impl Here {
 
     /// How the GPUs that a report has timings of differ from those of this machine.
     fn other_gpus(&self, report: &Report) -> Vec<String> {
-        let mut timed: Vec<u32> = report.algorithms.iter().flat_map(|t| uses(&t.id)).copied().collect();
-        timed.sort_unstable();
-        timed.dedup();
+        let timed: BTreeSet<u32> = report.algorithms.iter().flat_map(|t| uses(&t.id)).copied().collect();
         let there = |k: u32| report.hardware.gpu(k).map(|g| &g.gpu);
         let here = |k: u32| self.gpus().identities.iter().find(|g| g.index == k);
         timed.into_iter().filter_map(|k| difference(there(k), here(k))).collect()

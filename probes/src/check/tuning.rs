@@ -4,6 +4,7 @@ use super::{Finding, Here};
 use crate::revisions;
 use sapwise::algorithm::{Backend, usable_cores};
 use sapwise::{AlgorithmId, Tuning};
+use std::collections::BTreeSet;
 
 impl Here {
     pub(super) fn tuning(&self, tuning: &Tuning, finding: &mut Finding) {
@@ -12,10 +13,8 @@ impl Here {
             revisions::stale_in_tuning(tuning, &self.registry),
             "predict again, or probe again where they were measured",
         );
-        let mut wanted = tuning.algorithms();
-        wanted.extend(tuning.steps.iter().map(|s| &s.algorithm));
-        wanted.sort_unstable();
-        wanted.dedup();
+        let wanted: BTreeSet<&AlgorithmId> =
+            tuning.algorithms().into_iter().chain(tuning.steps.iter().map(|s| &s.algorithm)).collect();
         // One line for all that want more threads, however many they are.
         let (wide, others): (Vec<&AlgorithmId>, Vec<&AlgorithmId>) =
             wanted.into_iter().partition(|id| id.threads() > usable_cores());

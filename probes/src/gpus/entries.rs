@@ -2,7 +2,7 @@
 
 use super::choice::uses;
 use super::parameters::inert;
-use crate::child::{Ended, run_part};
+use crate::child::{Ended, answers};
 use sapwise::error::{GpuErrorKind, Unavailable};
 use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Pairs, Registry};
 use sapwise_gpu::Gpus;
@@ -55,11 +55,7 @@ fn try_out(algorithm: &mut dyn BroadPhase) -> Result<(), Error> {
 /// # Errors
 /// When no process can be started.
 pub(crate) fn entries() -> anyhow::Result<(Vec<OnGpus>, Option<String>)> {
-    let mut entries: Vec<OnGpus> = Vec::new();
-    let ended = run_part(&["gpu-algorithms"], LIMIT, &mut |line| {
-        entries.extend(serde_json::from_str::<OnGpus>(line));
-        Ok(())
-    })?;
+    let (entries, ended) = answers(&["gpu-algorithms"], LIMIT)?;
     let why = match ended {
         Ended::Well => None,
         Ended::Interrupted => Some("interrupted while its drivers were loaded".to_owned()),

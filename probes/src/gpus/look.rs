@@ -1,6 +1,6 @@
 //! The search for GPUs.
 
-use crate::child::{Ended, run_part};
+use crate::child::{Ended, answers};
 use sapwise_gpu::Gpus;
 use sapwise_tune::GpuIdentity;
 use std::time::Duration;
@@ -22,12 +22,7 @@ pub(crate) struct Seen {
 /// # Errors
 /// When no process can be started.
 pub(crate) fn look() -> anyhow::Result<Seen> {
-    let mut identities: Vec<GpuIdentity> = Vec::new();
-    let ended = run_part(&["gpus"], LIMIT, &mut |line| {
-        // Drivers print what they like on the standard output of whoever loads them.
-        identities.extend(serde_json::from_str::<GpuIdentity>(line));
-        Ok(())
-    })?;
+    let (identities, ended) = answers(&["gpus"], LIMIT)?;
     let remark = match ended {
         Ended::Well => return Ok(Seen { identities, remark: None }),
         Ended::Interrupted => "GPUs are left out: interrupted while looking for them".to_owned(),
@@ -49,10 +44,7 @@ impl Seen {
         if gpus.identities().eq(&self.identities) {
             return Ok(gpus);
         }
-        let names = |list: &mut dyn Iterator<Item = &GpuIdentity>| {
-            list.map(|g| format!("gpu{} ({})", g.index, g.name)).collect::<Vec<_>>().join(", ")
-        };
-        let (before, now) = (names(&mut self.identities.iter()), names(&mut gpus.identities()));
+        let (before, now) = (names(self.identities.iter()), names(gpus.identities()));
         let now = if now.is_empty() { "none".to_owned() } else { now };
         Err(format!("GPUs are left out: {before} were seen first and {now} now"))
     }
@@ -60,11 +52,14 @@ impl Seen {
     /// Returns which of these GPUs this machine lacks, in a sentence, if any.
     pub(crate) fn lacks(&self, indices: &[u32]) -> Option<String> {
         let absent = indices.iter().find(|k| self.identities.iter().all(|g| g.index != **k))?;
-        let there: Vec<String> = self.identities.iter().map(|g| format!("gpu{} ({})", g.index, g.name)).collect();
         Some(match &self.remark {
             Some(remark) => remark.clone(),
-            None if there.is_empty() => format!("this machine has no gpu{absent}: no GPU was found"),
-            None => format!("this machine has no gpu{absent}, only {}", there.join(", ")),
+            None if self.identities.is_empty() => format!("this machine has no gpu{absent}: no GPU was found"),
+            None => format!("this machine has no gpu{absent}, only {}", names(self.identities.iter())),
         })
     }
+}
+
+fn names<'a>(gpus: impl Iterator<Item = &'a GpuIdentity>) -> String {
+    gpus.map(|g| format!("gpu{} ({})", g.index, g.name)).collect::<Vec<_>>().join(", ")
 }

@@ -3,8 +3,9 @@
 use super::choice::{GpuChoice, uses};
 use super::look::look;
 use super::parameters::{group_without_parameters, inert, without_parameters};
-use crate::child::{Ended, run_part};
+use crate::child::{Ended, answers};
 use crate::progress::Progress;
+use sapwise_lab::text::once;
 use sapwise_tune::{GpuGroup, GpuHardware, GpuIdentity, GpuParameterId};
 use serde::de::DeserializeOwned;
 use std::time::Duration;
@@ -86,21 +87,14 @@ impl Measured {
 
     /// Measures every set of several GPUs that our algorithms run on.
     fn measure_groups(&mut self, threads: Option<u32>) -> anyhow::Result<()> {
-        let mut sets: Vec<Vec<u32>> = sapwise_gpu::algorithms(&self.usable)
-            .iter()
-            .map(|e| uses(&e.id).to_vec())
-            .filter(|s| s.len() > 1)
-            .collect();
-        sets.dedup();
+        let algorithms = sapwise_gpu::algorithms(&self.usable);
+        let sets = once(algorithms.iter().map(|e| uses(&e.id)).filter(|set| set.len() > 1));
         for set in sets {
-            if self.groups.iter().any(|g| g.gpus == set) {
-                continue;
-            }
-            let text = sapwise::algorithm::Backend::Gpu(set.clone()).to_string();
+            let text = sapwise::algorithm::Backend::Gpu(set.to_vec()).to_string();
             let group = part("gpu-group", &text, threads)?;
             self.groups.push(group.unwrap_or_else(|why| {
                 self.remarks.push(format!("{text} could not be measured together: {why}"));
-                group_without_parameters(&set, &why)
+                group_without_parameters(set, &why)
             }));
         }
         Ok(())
@@ -117,13 +111,8 @@ fn part<T: DeserializeOwned>(kind: &str, which: &str, threads: Option<u32>) -> a
     if let Some(threads) = &threads {
         arguments.extend(["--threads", threads]);
     }
-    let mut answer = None;
-    let ended = run_part(&arguments, LIMIT, &mut |line| {
-        // Drivers print what they like on the standard output of whoever loads them.
-        answer = serde_json::from_str(line).ok().or(answer.take());
-        Ok(())
-    })?;
-    Ok(match (ended, answer) {
+    let (mut all, ended) = answers(&arguments, LIMIT)?;
+    Ok(match (ended, all.pop()) {
         (Ended::Well, Some(answer)) => Ok(answer),
         (Ended::Well, None) => Err("the process that measured it returned no answer".to_owned()),
         (Ended::Interrupted, _) => Err("interrupted while it was measured".to_owned()),

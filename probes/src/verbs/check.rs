@@ -55,12 +55,12 @@ pub(crate) fn run(arguments: &Check, algorithms: &Algorithms) -> anyhow::Result<
     drop(progress);
     let kinds = compare(&mut files);
     let failed = files.iter().any(|f| !f.problems.is_empty());
-    if arguments.json {
-        output::print_json(&Answer { files, kinds })?;
-    } else {
-        output::print(&(text(&files, &kinds, Terminal::of_standard_output()) + &next_step(&files, &arguments.files)))?;
-    }
-    Ok(if failed { Outcome::Failed } else { Outcome::Done })
+    let answer = Answer { files, kinds };
+    let done = output::answer(arguments.json, &answer, || {
+        let Answer { files, kinds } = &answer;
+        text(files, kinds, Terminal::of_standard_output()) + &next_step(files, &arguments.files)
+    })?;
+    Ok(if failed { Outcome::Failed } else { done })
 }
 
 /// Sorts reports into kinds and compares each with the others of its kind. One that is slower than they are becomes

@@ -9,7 +9,7 @@ use crate::terminal::Terminal;
 use crate::{output, shell};
 use sapwise::AlgorithmId;
 use sapwise::algorithm::{SimdLevel, usable_cores};
-use sapwise_lab::text::count;
+use sapwise_lab::text::{count, once};
 use sapwise_tune::GpuIdentity;
 use serde::Serialize;
 
@@ -41,12 +41,7 @@ pub(crate) fn run(arguments: &Devices, known: &Algorithms) -> anyhow::Result<Out
     let (algorithms, inert) = algorithms(&seen, known)?;
     let answer = Answer { algorithms, adapters: seen.identities, remark: seen.remark, inert };
     drop(progress);
-    if arguments.json {
-        output::print_json(&answer)?;
-    } else {
-        output::print(&text(&answer, arguments.no_gpus, Terminal::of_standard_output()))?;
-    }
-    Ok(Outcome::Done)
+    output::answer(arguments.json, &answer, || text(&answer, arguments.no_gpus, Terminal::of_standard_output()))
 }
 
 /// Returns the algorithms on the CPU and on the GPUs, and a sentence for each GPU that executes nothing. Only other
@@ -75,13 +70,7 @@ fn algorithms(seen: &Seen, known: &Algorithms) -> anyhow::Result<(Vec<Algorithm>
     for sapwise::algorithm::Entry { id, revision, .. } in sapwise_gpu::algorithms(&seen.identities) {
         list.push(algorithm(&id, revision, reason(&id)));
     }
-    let mut inert: Vec<String> = Vec::new();
-    for sentence in on_gpus.iter().filter_map(|e| e.inert.as_ref()) {
-        if !inert.contains(sentence) {
-            inert.push(sentence.clone());
-        }
-    }
-    Ok((list, inert))
+    Ok((list, once(on_gpus.iter().filter_map(|e| e.inert.clone()))))
 }
 
 fn text(answer: &Answer, no_gpus: bool, terminal: Terminal) -> String {

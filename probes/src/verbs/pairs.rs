@@ -62,12 +62,7 @@ pub(crate) fn run(arguments: &Arguments, algorithms: &Algorithms) -> anyhow::Res
         samples_ms: samples_ns.iter().map(|&ns| ns as f64 / 1e6).collect(),
         fingerprint,
     };
-    if arguments.json {
-        output::print_json(&answer)?;
-    } else {
-        output::print(&(text(&answer, median_ns) + &next_step(arguments, frames.len())))?;
-    }
-    Ok(Outcome::Done)
+    output::answer(arguments.json, &answer, || text(&answer, median_ns) + &next_step(arguments, frames.len()))
 }
 
 /// Returns the pairs that fit into half of the free memory: a scene in which all boxes overlap then ends with an error,

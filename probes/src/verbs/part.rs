@@ -6,16 +6,11 @@ use crate::exit::{Outcome, WrongUsage};
 use crate::sweep::{SweepRequest, sweep};
 use crate::{child, gpus, output};
 use sapwise::algorithm::Backend;
-use sapwise_tune::measure::{self, Family, Options};
+use sapwise_tune::measure::Options;
 
 pub(crate) fn run(arguments: Part, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
     child::end_with_parent();
     match arguments.part {
-        PartKind::Hardware { family, threads } => {
-            let family: Family = family.parse().map_err(|e: sapwise::error::UnknownName| WrongUsage(e.to_string()))?;
-            let parameters = measure::family(family, &Options::default().with_threads(threads));
-            output::print_json(&parameters)?;
-        }
         PartKind::Gpus => gpus::print_identities()?,
         PartKind::GpuAlgorithms => gpus::print_entries()?,
         PartKind::Gpu { index, threads } => gpus::print_parameters(index, &Options::default().with_threads(threads))?,

@@ -22,11 +22,6 @@ pub(crate) fn run(arguments: &Schema) -> anyhow::Result<Outcome> {
         write_text(&path, &text)?;
         files.push(path.display().to_string());
     }
-    if arguments.json {
-        output::print_json(&Answer { files })?;
-    } else {
-        let wrote = files.iter().map(|f| format!("wrote {f}\n")).collect::<String>();
-        output::print(&wrote)?;
-    }
-    Ok(Outcome::Done)
+    let answer = Answer { files };
+    output::answer(arguments.json, &answer, || answer.files.iter().map(|f| format!("wrote {f}\n")).collect())
 }

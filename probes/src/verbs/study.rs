@@ -15,12 +15,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let progress = Progress::new(0);
     let summary = study(&arguments.reports, &arguments.out, &made(&arguments.reports), &progress)?;
     drop(progress);
-    if arguments.json {
-        output::print_json(&summary)?;
-    } else {
-        output::print(&text(&summary, &arguments.out, Terminal::of_standard_output()))?;
-    }
-    Ok(Outcome::Done)
+    output::answer(arguments.json, &summary, || text(&summary, &arguments.out, Terminal::of_standard_output()))
 }
 
 /// Returns when and by which command a page was made, and the commit of its reports if git knows it.

@@ -41,13 +41,9 @@ pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     if let Some(path) = &arguments.card {
         write_text(path, &model_card::page(&model, &training, &notes))?;
     }
-    if arguments.json {
-        output::print_json(&Answer { validation: &training.validation, model: &model.name, notes: &notes })?;
-    } else {
-        let terminal = Terminal::of_standard_output();
-        output::print(&summary(&model, &training, &notes, &arguments.out, terminal))?;
-    }
-    Ok(Outcome::Done)
+    let answer = Answer { validation: &training.validation, model: &model.name, notes: &notes };
+    let text = || summary(&model, &training, &notes, &arguments.out, Terminal::of_standard_output());
+    output::answer(arguments.json, &answer, text)
 }
 
 /// Returns the name that the user gave, or that of the file.

@@ -69,6 +69,22 @@ pub(crate) fn send(signal: &str, to: &std::process::Child) {
 /// Exit status of a command that SIGTERM stopped.
 pub(crate) const TERMINATED: i32 = 128 + 15;
 
+/// Starts a command, sends it SIGTERM when something is `ready`, and sees it end by that with this complaint.
+#[cfg(unix)]
+pub(crate) fn interrupt_when(command: &mut std::process::Command, ready: impl Fn() -> bool, complaint: &str) {
+    use std::process::Stdio;
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    while !ready() {
+        assert_eq!(child.try_wait().unwrap(), None, "it ended before it was to be interrupted");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    send("-TERM", &child);
+    let ended = child.wait_with_output().unwrap();
+    let told = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert_eq!(ended.status.code(), Some(TERMINATED), "{told}");
+    assert!(told.contains(complaint), "{told}");
+}
+
 /// Runs to exit status 0 and returns standard output.
 pub(crate) fn success(command: &mut Command) -> String {
     let ended = command.output().unwrap();
@@ -93,12 +109,13 @@ pub(crate) fn tuning(steps: &[(u32, &str)]) -> Value {
     })
 }
 
-/// Runs to this exit status and returns standard error, which must not be a panic.
-pub(crate) fn failure(command: &mut Command, status: i32) -> String {
+/// Runs to this exit status and returns standard error, which must hold these texts and no panic.
+pub(crate) fn failure(command: &mut Command, status: i32, texts: &[&str]) -> String {
     let ended = command.output().unwrap();
     let complaint = String::from_utf8(ended.stderr).unwrap();
     assert_eq!(ended.status.code(), Some(status), "{command:?}: {complaint}");
     assert!(!complaint.contains("panicked"), "{complaint}");
+    texts.iter().for_each(|text| assert!(complaint.contains(text), "{command:?}: {text} is missing: {complaint}"));
     complaint
 }
 

@@ -6,6 +6,7 @@ use sapwise::AlgorithmId;
 use sapwise::algorithm::{BackendClass, Entry, Load};
 use sapwise_tune::Hardware;
 use sapwise_tune::hardware::ParameterId;
+use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// A report without its samples, of which thousands fit into memory.
@@ -192,11 +193,8 @@ fn usual<'a>(mut names: impl Iterator<Item = &'a str> + Clone) -> &'a str {
 }
 
 /// Returns the hosts of profiles, each once, in order.
-pub fn machines(profiles: &[Profile]) -> Vec<&str> {
-    let mut machines: Vec<&str> = profiles.iter().map(Profile::machine).collect();
-    machines.sort_unstable();
-    machines.dedup();
-    machines
+pub fn machines(profiles: &[Profile]) -> BTreeSet<&str> {
+    profiles.iter().map(Profile::machine).collect()
 }
 
 /// Returns whether a timing has no error and enough samples.

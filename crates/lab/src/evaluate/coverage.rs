@@ -4,7 +4,7 @@ use crate::data::Profile;
 use crate::training::Coverage;
 use sapwise::tuning::AlgorithmCost;
 use sapwise_tune::stats::{mean, quantile};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The share of times that an interval should hold.
 const HELD: f64 = 0.9;
@@ -43,9 +43,7 @@ impl Errors {
 pub(super) fn coverage(all: &[Errors]) -> Option<Coverage> {
     let (times_90_ln, times) = of(all, |e| &e.times)?;
     let (ratios_90_ln, ratios) = of(all, |e| &e.ratios)?;
-    let mut machines: Vec<&str> = all.iter().map(|e| e.machine.as_str()).collect();
-    machines.sort_unstable();
-    machines.dedup();
+    let machines: BTreeSet<&str> = all.iter().map(|e| e.machine.as_str()).collect();
     Some(Coverage { physical_machines: machines.len(), times_90_ln, times, ratios_90_ln, ratios })
 }
 

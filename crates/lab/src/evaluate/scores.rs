@@ -4,6 +4,7 @@ use super::held_out::UnitRegrets;
 use super::regret_table::Regret;
 use crate::data::Profile;
 use crate::spread::range;
+use crate::text::once;
 use crate::training::{MethodScore, Regrets, Split};
 use sapwise_tune::stats::{self, median};
 use std::collections::BTreeMap;
@@ -79,13 +80,7 @@ fn of_units(all: &[Judged], strategy: &'static str, by_machine: bool) -> Vec<Uni
 
 /// Returns the names of the strategies, in the order of the first profile.
 fn names(all: &[Judged]) -> Vec<&'static str> {
-    let mut names: Vec<&str> = Vec::new();
-    all.iter().for_each(|j| {
-        if !names.contains(&j.name) {
-            names.push(j.name);
-        }
-    });
-    names
+    once(all.iter().map(|j| j.name))
 }
 
 fn score(all: &[Judged], name: &'static str, by_machine: bool) -> MethodScore {

@@ -90,9 +90,7 @@ pub fn validate(
         chance = floor(profiles, |k| data.regret_table(k), |k| seen.costs(k));
         covered = coverage(&errors).filter(|_| partition.by_machine);
     }
-    let mut cpu_models: Vec<&str> = profiles.iter().map(Profile::cpu_model).collect();
-    cpu_models.sort_unstable();
-    cpu_models.dedup();
+    let cpu_models: BTreeSet<&str> = profiles.iter().map(Profile::cpu_model).collect();
     if partition.by_machine && cpu_models.len() == 1 {
         notes.push(
             "all hosts are of one CPU model: this says little about other models; add reports of machines with \

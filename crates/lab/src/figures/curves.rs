@@ -1,7 +1,8 @@
 //! Curves over two logarithmic axes, with the fields of optimal performance behind them: Figures 4, 6 and 7 of the
 //! paper.
 
-use super::{Area, HPos, Result, base, colour, grid, mesh, panels, range, svg, text};
+use super::{Area, Result, base, chart, colour, grid, mesh, panels, range, svg};
+use crate::text::once;
 use plotters::prelude::*;
 
 /// Panels with the same axes.
@@ -42,12 +43,7 @@ impl Curves {
     /// # Errors
     /// When plotters fails.
     pub(crate) fn svg(&self) -> Result<String> {
-        let mut names: Vec<String> = Vec::new();
-        for curve in self.panels.iter().flat_map(|p| &p.curves) {
-            if !names.contains(&curve.name) {
-                names.push(curve.name.clone());
-            }
-        }
+        let names = once(self.panels.iter().flat_map(|p| &p.curves).map(|curve| curve.name.clone()));
         let (rows, columns) = grid(self.panels.len());
         let size = (if columns == 1 { 900 } else { 1400 }, if rows == 1 { 460 } else { 340 * rows as u32 });
         svg(size, &self.title, &names, |area| {
@@ -61,12 +57,7 @@ impl Curves {
     fn panel(&self, panel: &CurvePanel, names: &[String], area: &Area<'_>) -> Result<()> {
         let points = || self.panels.iter().flat_map(|p| &p.curves).flat_map(|c| &c.points);
         let (x, y) = (range(points().map(|p| p.0), 1.1), range(points().map(|p| p.1), 1.2));
-        text(area, &panel.title, (70, 10), HPos::Left)?;
-        let mut chart = ChartBuilder::on(area)
-            .margin_top(22)
-            .margin_right(16)
-            .x_label_area_size(44)
-            .y_label_area_size(70)
+        let mut chart = chart(area, &panel.title)?
             .build_cartesian_2d(x.clone().log_scale().base(base(&x)), y.clone().log_scale().base(base(&y)))?;
         let place = |name: &str| colour(names.iter().position(|n| n == name).unwrap_or_default());
         let rectangle = |f: &Field| {

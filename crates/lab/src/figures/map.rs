@@ -1,6 +1,6 @@
 //! The field map: the fastest algorithm over the number of objects and the density of pairs.
 
-use super::{Area, HPos, Result, colour, grid, mesh, panels, range, svg, text};
+use super::{Area, Result, chart, colour, grid, mesh, panels, range, svg};
 use plotters::prelude::*;
 
 /// Panels over the same axes.
@@ -48,13 +48,7 @@ impl FieldMap {
         let cells = || self.panels.iter().flat_map(|p| &p.cells);
         let x = range(cells().flat_map(|c| [c.from.0, c.to.0]), 1.0);
         let y = range(cells().flat_map(|c| [c.from.1, c.to.1]), 1.0);
-        text(area, &panel.title, (70, 10), HPos::Left)?;
-        let mut chart = ChartBuilder::on(area)
-            .margin_top(22)
-            .margin_right(16)
-            .x_label_area_size(44)
-            .y_label_area_size(70)
-            .build_cartesian_2d(x.log_scale(), y.log_scale())?;
+        let mut chart = chart(area, &panel.title)?.build_cartesian_2d(x.log_scale(), y.log_scale())?;
         mesh(&mut chart, "objects", self.y_name)?;
         let shade = |c: &Cell| Rectangle::new([c.from, c.to], colour(c.algorithm).mix(0.5).filled());
         chart.draw_series(panel.cells.iter().map(shade))?;

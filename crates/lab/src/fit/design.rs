@@ -2,8 +2,9 @@
 //! thread counts and GPUs share it.
 
 use crate::data::Profile;
+use crate::fit::designs::Designs;
 use crate::fit::late_helpers::{self, Called};
-use crate::fit::load_residual::{Basis, Features, Groups};
+use crate::fit::load_residual::{Features, Groups};
 use crate::fit::method_rows::thinned;
 use crate::fit::min_of_two::MinOfTwo;
 use crate::fit::robust::Problem;
@@ -14,16 +15,17 @@ use anyhow::Result;
 use ndarray::{Array1, Array2, ShapeBuilder};
 use sapwise::AlgorithmId;
 use sapwise::algorithm::{Backend, BackendClass};
-use sapwise::internals::{Fallback, Places, Work};
+use sapwise::internals::{Fallback, Work};
+use sapwise::tuning::Term;
 use sapwise_scenes::Random;
+use sapwise_tune::GpuKind;
 use sapwise_tune::hardware::ParameterId;
 use sapwise_tune::model::{
-    FallbackModel, GroupResidual, HelpersModel, MethodModel, ModelTerm, PredictError, ThreadFigures,
+    FallbackModel, GroupResidual, HelpersModel, MethodModel, ModelTerm, PredictError, Scale, ThreadFigures,
 };
 use sapwise_tune::stats::robust_deviation;
-use sapwise_tune::{GpuKind, Hardware};
-use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Points on one thread, or on GPUs, that a method needs on all machines together.
@@ -33,6 +35,9 @@ const MOST_FITTED: usize = 6000;
 const FEWEST_OF_PROFILE: usize = 2;
 /// Timings on several threads that the parameters of helpers are fitted to, at most.
 const MOST_CALLED: usize = 1000;
+
+/// A model of the rows that were fitted, if they are enough.
+type Fit = Result<Option<MethodModel>>;
 
 /// The rows of one method.
 #[derive(Debug)]
@@ -82,7 +87,7 @@ impl Design {
                 BackendClass::Cpu => GroupResidual::of_one_thread(&profile.hardware),
                 BackendClass::Gpu => Ok(Vec::new()),
             };
-            let ns = nanoseconds(&components, &profile.hardware, profile.id(row.algorithm), &row);
+            let ns = nanoseconds(&components, profile, &row);
             match ns.and_then(|ns| Ok((ns, at()?))) {
                 Ok((ns, at)) => {
                     values.extend(ns);
@@ -148,14 +153,8 @@ impl Design {
     ///
     /// # Errors
     /// When the residual can't be solved for.
-    pub(super) fn fit(
-        &self,
-        rows: &[usize],
-        profiles: &[Profile],
-        machines: &[usize],
-        other: Option<&MethodModel>,
-        basis: &Basis,
-    ) -> Result<Option<MethodModel>> {
+    pub(super) fn fit(&self, rows: &[usize], all: &Designs<'_>, other: Option<&MethodModel>) -> Fit {
+        let profiles = all.profiles;
         let measured: Vec<usize> = rows.iter().copied().filter(|&k| !self.rows[k].floor).collect();
         let Some(&first) = measured.first().filter(|_| measured.len() >= FEWEST_POINTS) else { return Ok(None) };
         let of_profiles = rows.chunk_by(|a, b| self.rows[*a].profile == self.rows[*b].profile);
@@ -163,36 +162,34 @@ impl Design {
         let some = |own: &[usize]| thinned(own.to_vec(), most, self.rows[own[0]].profile);
         let fitted: Vec<usize> = of_profiles.flat_map(some).collect();
         let problem = |rows: &[usize]| {
-            let all: Vec<&Row> = rows.iter().map(|&k| &self.rows[k]).collect();
+            let own: Vec<&Row> = rows.iter().map(|&k| &self.rows[k]).collect();
             let values = |(k, j): (usize, usize)| self.values[[rows[k], j]];
             Problem {
                 terms: Array2::from_shape_fn((rows.len(), self.components.len()).f(), values),
-                ns: all.iter().map(|r| r.ns).collect(),
-                weights: weights(&all, machines),
-                floors: all.iter().map(|r| r.floor).collect(),
+                ns: own.iter().map(|r| r.ns).collect(),
+                weights: weights(&own, &all.machines),
+                floors: own.iter().map(|r| r.floor).collect(),
             }
         };
-        let other_ns =
-            |rows: &[usize]| other.map(|other| self.other_ns(rows, other, profiles, &basis.places)).transpose();
-        let (to_fit, all) = (problem(&fitted), problem(&measured));
+        let other_ns = |rows: &[usize]| other.map(|other| self.other_ns(rows, other, all)).transpose();
+        let (to_fit, whole) = (problem(&fitted), problem(&measured));
         let min_of_two = other_ns(&fitted)?.map(|other_ns| MinOfTwo::fit(&to_fit, &other_ns));
         let units = Array1::from(min_of_two.as_ref().map_or_else(|| to_fit.units(), |found| found.units.clone()));
         let modelled = match min_of_two.as_ref().zip(other_ns(&measured)?) {
-            Some((min_of_two, other_ns)) => min_of_two.modelled(&all, &other_ns),
-            None => all.terms.dot(&units),
+            Some((min_of_two, other_ns)) => min_of_two.modelled(&whole, &other_ns),
+            None => whole.terms.dot(&units),
         };
         if modelled.iter().any(|ns| *ns <= 0.0) {
             return Ok(None);
         }
-        let mut gpu_kinds: Vec<GpuKind> = rows.iter().flat_map(|&k| self.gpu_kinds(k, profiles)).collect();
-        gpu_kinds.sort_unstable();
-        gpu_kinds.dedup();
+        let gpu_kinds: BTreeSet<GpuKind> = rows.iter().flat_map(|&k| self.gpu_kinds(k, profiles)).collect();
+        let gpu_kinds = Vec::from_iter(gpu_kinds);
         // The error on a software adapter is that of its CPU, twice as large on one machine as on another: no
         // function of the load.
-        let ln: Vec<f64> = all.ns.iter().zip(&modelled).map(|(ns, modelled)| (ns / modelled).ln()).collect();
+        let ln: Vec<f64> = whole.ns.iter().zip(&modelled).map(|(ns, modelled)| (ns / modelled).ln()).collect();
         let (residual, left) = match gpu_kinds[..] {
             [GpuKind::Software] => (Vec::new(), ln),
-            _ => self.groups.residual(basis, |k| measured.binary_search(&k).is_ok(), &ln)?,
+            _ => self.groups.residual(&all.basis, |k| measured.binary_search(&k).is_ok(), &ln)?,
         };
         let spread_ln = robust_deviation(&left).unwrap_or(0.0);
         let used = self.components.iter().zip(&units).filter(|(_, u)| **u > 0.0);
@@ -222,30 +219,28 @@ impl Design {
         model: &mut MethodModel,
         other: Option<&MethodModel>,
         chosen: &[bool],
-        profiles: &[Profile],
-        machines: &[usize],
-        basis: &Basis,
+        all: &Designs<'_>,
     ) -> Result<()> {
         if self.never_alone {
             model.helpers = (self.class == BackendClass::Cpu).then_some(HelpersModel::new(0.0, 0.0, 1.0, 0));
             return Ok(());
         }
         let held: Vec<_> = self.called.iter().filter(|(row, ..)| chosen[row.profile]).collect();
-        let weights = weights(&held.iter().map(|(row, ..)| row).collect::<Vec<_>>(), machines);
+        let weights = weights(&held.iter().map(|(row, ..)| row).collect::<Vec<_>>(), &all.machines);
         let mut works: BTreeMap<usize, Work> = BTreeMap::new();
         let mut called = Vec::new();
         for ((row, figures, alone_ns), weight) in held.into_iter().zip(weights) {
-            let profile = &profiles[row.profile];
+            let (profile, places) = (&all.profiles[row.profile], &all.basis.places);
             if let Entry::Vacant(place) = works.entry(row.profile) {
                 let one = &Backend::Cpu(1);
                 let fallback = match (&model.fallback, other) {
                     (Some(f), Some(other)) => {
-                        let work = Arc::new(other.work(&profile.hardware, one, &basis.places, None)?);
+                        let work = Arc::new(other.work(&profile.hardware, one, places, None)?);
                         Some(Fallback { work, factor: f.factor })
                     }
                     _ => None,
                 };
-                place.insert(model.work(&profile.hardware, one, &basis.places, fallback)?);
+                place.insert(model.work(&profile.hardware, one, places, fallback)?);
             }
             let threads = profile.id(row.algorithm).threads();
             model.max_threads = model.max_threads.max(threads);
@@ -268,37 +263,27 @@ impl Design {
     ///
     /// # Errors
     /// When a machine lacks a parameter for it.
-    fn other_ns(
-        &self,
-        rows: &[usize],
-        other: &MethodModel,
-        profiles: &[Profile],
-        places: &Arc<Places>,
-    ) -> Result<Vec<f64>, PredictError> {
+    fn other_ns(&self, rows: &[usize], other: &MethodModel, all: &Designs<'_>) -> Result<Vec<f64>, PredictError> {
         // Each GPU of a profile has its own.
         let mut works: BTreeMap<(usize, &Backend), Work> = BTreeMap::new();
-        let mut all = Vec::with_capacity(rows.len());
-        for row in rows.iter().map(|&k| &self.rows[k]) {
-            let (profile, backend) = (&profiles[row.profile], profiles[row.profile].id(row.algorithm).backend());
-            let at = (row.profile, backend);
-            let work = match works.entry(at) {
+        let ns = |row: &Row| {
+            let profile = &all.profiles[row.profile];
+            let backend = profile.id(row.algorithm).backend();
+            let work = match works.entry((row.profile, backend)) {
                 Entry::Occupied(known) => known.into_mut(),
-                Entry::Vacant(place) => place.insert(other.work(&profile.hardware, backend, places, None)?),
+                Entry::Vacant(place) => {
+                    place.insert(other.work(&profile.hardware, backend, &all.basis.places, None)?)
+                }
             };
-            all.push(work.ns(&row.load));
-        }
-        Ok(all)
+            Ok(work.ns(&row.load))
+        };
+        rows.iter().map(|&k| &self.rows[k]).map(ns).collect()
     }
 }
 
 /// Returns the nanoseconds for one unit of each component in a row.
-fn nanoseconds(
-    components: &[Component],
-    hardware: &Hardware,
-    id: &AlgorithmId,
-    row: &Row,
-) -> Result<Vec<f64>, PredictError> {
-    let backend = id.backend();
+fn nanoseconds(components: &[Component], profile: &Profile, row: &Row) -> Result<Vec<f64>, PredictError> {
+    let (hardware, backend) = (&profile.hardware, profile.id(row.algorithm).backend());
     let cache = hardware.value(ParameterId::CacheLlcBytes).filter(|c| *c > 0.0);
     let cache = match backend.class() {
         BackendClass::Cpu => cache
@@ -306,12 +291,10 @@ fn nanoseconds(
         BackendClass::Gpu => 0.0,
     };
     let sum = |component: &Component| -> Result<f64, PredictError> {
-        let terms = component.0.iter();
-        terms
-            .map(|&(times, term, scale)| {
-                Ok(times * term.count(&row.load, cache) * scale.nanoseconds(hardware, backend)?)
-            })
-            .sum()
+        let ns = |&(times, term, scale): &(f64, Term, Scale)| {
+            Ok(times * term.count(&row.load, cache) * scale.nanoseconds(hardware, backend)?)
+        };
+        component.0.iter().map(ns).sum()
     };
     components.iter().map(sum).collect()
 }

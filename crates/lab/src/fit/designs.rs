@@ -5,6 +5,7 @@ use crate::fit::design::{Design, FEWEST_POINTS};
 use crate::fit::load_residual::{Basis, places};
 use crate::fit::method_rows::rows_by_method;
 use crate::fit::terms::{Component, components, fallback_method};
+use crate::text::once;
 use anyhow::Result;
 use sapwise::algorithm::BackendClass;
 use sapwise::internals::Places;
@@ -78,10 +79,9 @@ impl<'a> Designs<'a> {
             if design.leave_out_software(&mut rows, self.profiles) && !notes.contains(&note) {
                 notes.push(note);
             }
-            match design.fit(&rows, self.profiles, &self.machines, other.as_ref(), &self.basis)? {
+            match design.fit(&rows, self, other.as_ref())? {
                 Some(mut model) => {
-                    let (profiles, machines) = (self.profiles, &self.machines);
-                    design.call_helpers(&mut model, other.as_ref(), chosen, profiles, machines, &self.basis)?;
+                    design.call_helpers(&mut model, other.as_ref(), chosen, self)?;
                     models.push(model);
                 }
                 // None of the chosen profiles knows it.
@@ -100,13 +100,7 @@ impl<'a> Designs<'a> {
 fn reported_terms(profiles: &[Profile], method: &str, class: BackendClass) -> Option<Vec<Component>> {
     let timed = profiles.iter().flat_map(|p| &p.algorithms);
     let own = timed.filter(|t| t.id.method() == method && t.id.backend().class() == class).flat_map(|t| &t.terms);
-    let mut components: Vec<Component> = Vec::new();
-    for component in own.map(|t| Component::of(t.term, t.scale)) {
-        if !components.contains(&component) {
-            components.push(component);
-        }
-    }
-    Some(components).filter(|c| !c.is_empty())
+    Some(once(own.map(|t| Component::of(t.term, t.scale)))).filter(|c| !c.is_empty())
 }
 
 /// Returns the position of the physical machine of each profile.

@@ -9,6 +9,7 @@ use sapwise::algorithm::Load;
 use sapwise::tuning::{AlgorithmCost, Crossover, Source};
 use sapwise::{AlgorithmId, Tuning};
 use sapwise_tune::Model;
+use std::collections::BTreeSet;
 
 /// Returns the tuning of the machine of a report, with steps and crossovers for `scenario`.
 ///
@@ -49,9 +50,7 @@ pub fn slice_tuning(costs: Vec<AlgorithmCost>, scenario: &str, loads: &[Load]) -
 pub fn measured_slice(profile: &Profile, scenario: &str) -> Result<Vec<Load>> {
     let loads = profile.slice(scenario);
     if loads.len() < 2 {
-        let mut known: Vec<&str> = profile.scenarios().collect();
-        known.sort_unstable();
-        known.dedup();
+        let known = Vec::from_iter(profile.scenarios().collect::<BTreeSet<_>>());
         let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
         bail!("the report has {} sizes of the scenario {scenario:?}, two are needed; it holds: {known}", loads.len());
     }

@@ -18,7 +18,7 @@ pub fn model(designs: &Designs<'_>, chosen: &[bool], name: &str) -> Result<(Mode
         designs.profiles.iter().zip(chosen).filter(|(_, chosen)| **chosen).map(|(p, _)| p).collect();
     let model = Model::new(name, methods, ranges(&profiles)).with_places(Arc::clone(&designs.basis.places));
     if let Some(defect) = model.defect() {
-        bail!("no model could be fitted: {}", [vec![defect.to_string()], notes].concat().join("; "));
+        bail!("no model could be fitted: {}", [vec![defect], notes].concat().join("; "));
     }
     Ok((model, notes))
 }

@@ -18,20 +18,18 @@ const FEWEST_POINTS: usize = 5;
 /// Objects from which on a frame counts for a speed-up.
 const LARGE: u32 = 1000;
 
-pub(super) fn section(material: &Material, page: &mut Page, files: &mut Vec<(&str, String)>) -> Result<()> {
+pub(super) fn section(material: &Material, page: &mut Page) -> Result<()> {
     page.section("What parameters go with");
     let hosts = material.whole_hosts();
     match &hosts[..] {
         [reference, others @ ..] if !others.is_empty() => {
-            let svg = cpus(reference, others).svg()?;
             let caption = format!(
                 "Figures 10 and 11 for CPUs: parameters over those of the reference, and how many times as fast each \
                  method is on one thread, geometric mean over shared frames of 1000 objects or more. {} show what goes \
                  together, not what causes what.",
                 count(hosts.len(), "host")
             );
-            page.figure("figure-10-cpus.svg", &svg, &caption);
-            files.push(("figure-10-cpus.svg", svg));
+            page.figure("figure-10-cpus.svg", cpus(reference, others).svg()?, &caption);
         }
         _ => page.lacks("Figures 10 and 11 for CPUs: it takes two hosts."),
     }
@@ -41,21 +39,16 @@ pub(super) fn section(material: &Material, page: &mut Page, files: &mut Vec<(&st
         published.chain(measured).flat_map(|(_, r)| &r.hardware.gpus).filter(|g| is_real(g)).collect();
     match &all[..] {
         [reference, others @ ..] if !others.is_empty() => {
-            let svg = gpus(reference, others).svg()?;
-            page.figure(
-                "figure-10-gpus.svg",
-                &svg,
-                "Figures 10 and 11 for GPUs: the paper's parameters over those of the reference.",
-            );
-            files.push(("figure-10-gpus.svg", svg));
+            let caption = "Figures 10 and 11 for GPUs: the paper's parameters over those of the reference.";
+            page.figure("figure-10-gpus.svg", gpus(reference, others).svg()?, caption);
         }
         _ => page.lacks("Figures 10 and 11 for GPUs: it takes two GPUs; datasets/published holds those of the paper."),
     }
-    influence(material, page, files)
+    influence(material, page)
 }
 
 /// The table of influences.
-fn influence(material: &Material, page: &mut Page, files: &mut Vec<(&str, String)>) -> Result<()> {
+fn influence(material: &Material, page: &mut Page) -> Result<()> {
     let found = material.trained.as_ref().map(|t| influences(&material.profiles, &t.model)).unwrap_or_default();
     if found.is_empty() {
         page.lacks("Influence on crossovers: none was measured in three reports and moves with a parameter.");
@@ -72,7 +65,7 @@ fn influence(material: &Material, page: &mut Page, files: &mut Vec<(&str, String
     };
     let columns = "crossover reports hosts parameter model_octaves data_octaves data_least data_most decided";
     let rows: Vec<Vec<String>> = found.iter().map(row).collect();
-    files.push(("influence.csv", super::csv::table(columns, rows.iter().cloned())?));
+    page.files.push(("influence.csv", super::csv::table(columns, rows.iter().cloned())?));
     let head = columns.split(' ').map(|c| c.replace('_', " ")).collect();
     let hosts = crate::data::machines(&material.profiles).len();
     let caption = format!(

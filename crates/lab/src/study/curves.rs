@@ -48,7 +48,7 @@ impl Compared {
     }
 }
 
-pub(super) fn section(material: &Material, page: &mut Page, files: &mut Vec<(&str, String)>) -> Result<()> {
+pub(super) fn section(material: &Material, page: &mut Page) -> Result<()> {
     page.section("Time over objects");
     page.text(
         "Each curve is the fastest algorithm on that many threads or GPUs, medians over the frames of one scenario. \
@@ -75,19 +75,14 @@ pub(super) fn section(material: &Material, page: &mut Page, files: &mut Vec<(&st
         }
         let panels = hosts.iter().map(|p| panel(material, p, compared)).collect();
         let time = Curves { title: what.to_owned(), x_name: "objects", y_name: "time of a frame (µs)", panels };
-        let svg = time.svg()?;
-        page.figure(file, &svg, &format!("{what}."));
-        files.push((file, svg));
+        page.figure(file, time.svg()?, &format!("{what}."));
         if compared == Compared::Threads {
             let panels = hosts.iter().map(|p| CurvePanel { curves: speed_ups(p), ..titled(p) }).collect();
             let title = "Speed-up over the number of threads".to_owned();
-            let svg = Curves { title, x_name: "threads", y_name: "speed-up", panels }.svg()?;
-            page.figure(
-                "speed-up.svg",
-                &svg,
-                "Speed-up of each method over one thread, geometric mean over frames of 1000 objects or more.",
-            );
-            files.push(("speed-up.svg", svg));
+            let curves = Curves { title, x_name: "threads", y_name: "speed-up", panels };
+            let caption =
+                "Speed-up of each method over one thread, geometric mean over frames of 1000 objects or more.";
+            page.figure("speed-up.svg", curves.svg()?, caption);
         }
     }
     page.text(

@@ -19,7 +19,7 @@ const UP: usize = 16;
 const MOST_BOXES: u32 = 20_000;
 const SEED: u64 = 1;
 
-pub(super) fn section(material: &Material, page: &mut Page, files: &mut Vec<(&str, String)>) -> Result<()> {
+pub(super) fn section(material: &Material, page: &mut Page) -> Result<()> {
     page.section("Fields over objects and density");
     let whole = material.whole_hosts();
     let Some(profile) = whole.first() else {
@@ -29,7 +29,6 @@ pub(super) fn section(material: &Material, page: &mut Page, files: &mut Vec<(&st
     match map(material, profile) {
         Err(why) => page.lacks(&format!("The field map: {why:#}.")),
         Ok((map, held_out)) => {
-            let svg = map.svg()?;
             let predicted = match held_out {
                 Some(held_out) => format!("Predicted: by a model that was trained without this {held_out}."),
                 None => "Nothing is predicted: that takes another report.".to_owned(),
@@ -40,8 +39,7 @@ pub(super) fn section(material: &Material, page: &mut Page, files: &mut Vec<(&st
                  timings of {}; points are the frames that were timed, of all scenarios. {predicted}",
                 title(profile)
             );
-            page.figure("field-map.svg", &svg, &caption);
-            files.push(("field-map.svg", svg));
+            page.figure("field-map.svg", map.svg()?, &caption);
         }
     }
     Ok(())

@@ -71,24 +71,24 @@ pub fn study(reports: &[PathBuf], out: &Path, made: &str, progress: &dyn Progres
     prepare(out)?;
     let material = Material::new(read_reports(reports, progress)?, progress)?;
     progress.message("drawing");
-    let mut files: Vec<(&str, String)> = vec![
+    let mut page = Page::default();
+    page.files = vec![
         ("timings.csv", csv::timings(&material)?),
         ("crossovers.csv", csv::crossovers(&material)?),
         ("regrets.csv", csv::regrets(&material)?),
         ("parameters.csv", csv::parameters(&material)?),
     ];
-    let mut page = Page::default();
     page.text(&material.lead());
     page.text(made);
-    curves::section(&material, &mut page, &mut files)?;
-    map::section(&material, &mut page, &mut files)?;
+    curves::section(&material, &mut page)?;
+    map::section(&material, &mut page)?;
     regrets(&material, &mut page);
     machines::section(&material, &mut page);
-    causes::section(&material, &mut page, &mut files)?;
+    causes::section(&material, &mut page)?;
     material.notes.iter().for_each(|note| page.text(&format!("Note: {note}.")));
-    let missing = page.missing.clone();
-    files.insert(0, (PAGE, page.finish()));
+    page.files.insert(0, (PAGE, page.text_of()));
     progress.check()?;
+    let Page { files, missing, .. } = page;
     for (name, text) in &files {
         write_text(&out.join(name), text)?;
     }

@@ -28,6 +28,8 @@ th:first-child, td:first-child { text-align: left }
 #[derive(Debug, Default)]
 pub(super) struct Page {
     body: String,
+    /// The files beside it: figures, and tables.
+    pub(super) files: Vec<(&'static str, String)>,
     /// What could not be shown, and why.
     pub(super) missing: Vec<String>,
 }
@@ -47,12 +49,13 @@ impl Page {
         self.missing.push(what.to_owned());
     }
 
-    /// Shows a figure with a link to its file.
-    pub(super) fn figure(&mut self, file: &str, svg: &str, caption: &str) {
+    /// Shows a figure with a link to its file, and keeps it for that.
+    pub(super) fn figure(&mut self, file: &'static str, svg: String, caption: &str) {
         let caption = escaped(caption);
         self.push(format_args!(
             "<figure>\n{svg}<figcaption>{caption} <a href=\"{file}\">{file}</a></figcaption>\n</figure>"
         ));
+        self.files.push((file, svg));
     }
 
     /// Shows a table, the first row its head.
@@ -61,7 +64,8 @@ impl Page {
         self.push(format_args!("<div class=\"wide\"><table><caption>{caption}</caption>{}</table></div>", html(rows)));
     }
 
-    pub(super) fn finish(self) -> String {
+    /// Returns its text.
+    pub(super) fn text_of(&self) -> String {
         format!("{HEAD}{}</body>\n</html>\n", self.body)
     }
 

@@ -1,5 +1,7 @@
 //! Cache sizes that the system reports.
 
+use std::collections::BTreeSet;
+
 /// A data cache of the first CPU.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Cache {
@@ -43,9 +45,7 @@ fn from_sysfs() -> Vec<Cache> {
     let cache = |index| {
         let level = read(0, index, "level")?.trim().parse().ok()?;
         let bytes = parse_size(&read(0, index, "size")?)?;
-        let mut sharers: Vec<String> = (0..cpus).filter_map(|cpu| read(cpu, index, "shared_cpu_list")).collect();
-        sharers.sort_unstable();
-        sharers.dedup();
+        let sharers: BTreeSet<String> = (0..cpus).filter_map(|cpu| read(cpu, index, "shared_cpu_list")).collect();
         Some(Cache { level, bytes, instances: sharers.len().max(1) as u64 })
     };
     // No CPU has more than five.

@@ -1,20 +1,8 @@
-//! Why a model is unusable, and why it can't predict.
+//! Why a model can't predict.
 
 use crate::hardware::HardwareError;
 use sapwise::error::CurveError;
 use std::fmt;
-
-/// What makes a model unusable, in a sentence that names the method, the range or the place.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ModelError(pub(super) String);
-
-impl fmt::Display for ModelError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl std::error::Error for ModelError {}
 
 /// Why a model can't predict a cost. A parameter is named with the GPU that it is of.
 #[derive(Debug, Clone, PartialEq)]

@@ -70,12 +70,9 @@ pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Ou
     if let Some(path) = &arguments.plot {
         write_text(path, &outcome.picture(settings.source.name(), answer.caption()).svg()?)?;
     }
-    if arguments.json {
-        output::print_json(&answer.json()?)?;
-    } else {
-        output::print(&answer.text(arguments, Terminal::of_standard_output()))?;
-    }
-    Ok(if outcome.interrupted { Outcome::Failed } else { Outcome::Done })
+    let text = || answer.text(arguments, Terminal::of_standard_output());
+    let done = output::answer(arguments.json, &answer.json()?, text)?;
+    Ok(if outcome.interrupted { Outcome::Failed } else { done })
 }
 
 /// Refuses outputs that can't be written, before the run.
