@@ -121,7 +121,6 @@ mod tests {
     use super::*;
     use crate::args::{Arguments, Verb};
     use clap::Parser;
-    use sapwise::algorithm::Load;
     use sapwise_lab::report::Timing;
     use sapwise_tune::{GpuHardware, GpuIdentity, Machine};
 
@@ -134,16 +133,7 @@ mod tests {
     }
 
     fn point(foreign_load: Option<f64>) -> Point {
-        Point {
-            scenario: "uniform".to_owned(),
-            load: Load::default(),
-            pairs: 0,
-            fingerprint: String::new(),
-            foreign_load,
-            spoiled: 0,
-            core_to_core_ns: None,
-            timings: Vec::new(),
-        }
+        Point { scenario: "uniform".to_owned(), foreign_load, ..Point::default() }
     }
 
     #[test]

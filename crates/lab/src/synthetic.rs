@@ -204,12 +204,8 @@ fn provenance() -> Provenance {
         date: "2000-01-01".to_owned(),
         command: "test data, not a measurement".to_owned(),
         seed: 1,
-        threads: None,
-        simd: None,
-        gpu_threads: None,
-        restriction: None,
         optimised: true,
-        seconds: 0.0,
+        ..Provenance::default()
     }
 }
 
@@ -219,10 +215,8 @@ fn point(scenario: &str, load: Load, timings: Vec<Timing>) -> Point {
         load,
         pairs: load.pairs as u64,
         fingerprint: "0".repeat(16),
-        foreign_load: None,
-        spoiled: 0,
-        core_to_core_ns: None,
         timings,
+        ..Point::default()
     }
 }
 

@@ -227,10 +227,8 @@ impl Race {
             load,
             pairs: answer.pairs,
             fingerprint: format!("{:016x}", answer.fingerprint),
-            foreign_load: None,
-            spoiled: 0,
-            core_to_core_ns: None,
             timings: timings.collect(),
+            ..Point::default()
         }
     }
 }

@@ -110,12 +110,8 @@ mod tests {
         let point = |&n: &u32| Point {
             scenario: "uniform".to_owned(),
             load: Load::of_objects(n),
-            pairs: 0,
-            fingerprint: String::new(),
-            foreign_load: None,
-            spoiled: 0,
-            core_to_core_ns: None,
             timings: vec![timing("brute", n * n / 10), timing("grid-sap", 30 * n), timing("sap", 900 * n)],
+            ..Point::default()
         };
         sizes.iter().map(point).collect()
     }

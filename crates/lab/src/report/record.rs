@@ -48,7 +48,7 @@ pub enum Label {
 }
 
 /// How a report was made.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub struct Provenance {
     /// Version of the command.
@@ -144,7 +144,7 @@ pub struct TimedTerm {
 }
 
 /// One scenario at one size: every algorithm on the same frames, in random order within each frame.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub struct Point {
     /// Name of the scenario.

@@ -191,11 +191,13 @@ pub fn hardware_for(parameters: &[ParameterId], options: &Options) -> Hardware {
 /// Of several parameters with one name it keeps the first. Absent parameters become missing; unknown names are dropped.
 #[must_use]
 pub fn assemble(machine: crate::hardware::Machine, measured: Vec<Parameter>) -> Hardware {
-    let find = |id: ParameterId| {
-        let found = Parameter::find(&measured, id).cloned();
-        found.unwrap_or_else(|| Parameter::missing(id, "not measured"))
-    };
-    Hardware::new(machine, ParameterId::ALL.into_iter().map(find).collect())
+    Hardware::new(machine, in_order(&ParameterId::ALL, &measured, "not measured"))
+}
+
+/// Each of these once: as measured, or missing with a reason.
+fn in_order(ids: &[impl AsRef<str>], measured: &[Parameter], absent: &str) -> Vec<Parameter> {
+    let find = |id: &_| Parameter::find(measured, id).cloned().unwrap_or_else(|| Parameter::missing(id, absent));
+    ids.iter().map(find).collect()
 }
 
 /// Marks several parameters missing for one reason.

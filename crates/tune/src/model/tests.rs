@@ -38,43 +38,24 @@ fn hardware() -> Hardware {
         (GpuParameterId::ReadGbPerS, 250.0),
         (GpuParameterId::ArithmeticGflopPerS, 500.0),
     ];
-    Hardware {
-        machine: Machine::default(),
-        parameters: parameters(&[(ParameterId::ClockMeasuredGhz, 4.0)]),
-        gpus: vec![gpu(0, GpuKind::Discrete, &fast), gpu(1, GpuKind::Discrete, &slow)],
-        gpu_groups: Vec::new(),
-    }
+    let gpus = [fast.as_slice(), &slow].into_iter().zip(0..).map(|(figures, k)| gpu(k, GpuKind::Discrete, figures));
+    let parameters = parameters(&[(ParameterId::ClockMeasuredGhz, 4.0)]);
+    Hardware::new(Machine::default(), parameters).with_gpus(gpus.collect())
 }
 
 fn method(backend: BackendClass, scale: Scale) -> MethodModel {
     MethodModel {
-        method: "brute".to_owned(),
-        backend,
-        revision: 1,
-        max_threads: 1,
         gpu_kinds: if backend == BackendClass::Gpu { vec![GpuKind::Software] } else { Vec::new() },
         terms: vec![ModelTerm { term: Term::Call, scale, unit: 2.0 }],
-        fallback: None,
-        residual: Vec::new(),
-        residual_by_motion: false,
-        helpers: None,
         spread_ln: 0.1,
+        ..MethodModel::new("brute", backend, 1)
     }
 }
 
 fn model(methods: Vec<MethodModel>) -> Model {
     let range = |parameter: &str| Range { parameter: parameter.to_owned(), min: 1.0, max: 100.0 };
-    Model {
-        name: "test".to_owned(),
-        ranges: vec![
-            range(ParameterId::ClockMeasuredGhz.as_str()),
-            range("gpu/upload_gb_per_s"),
-            range("gpu/copy_gb_per_s"),
-        ],
-        ratios_90_ln: None,
-        places: Arc::new(Places::new(Vec::new())),
-        methods,
-    }
+    let ranges = [ParameterId::ClockMeasuredGhz.as_str(), "gpu/upload_gb_per_s", "gpu/copy_gb_per_s"].map(range);
+    Model::new("test", methods, ranges.into())
 }
 
 fn ns(scale: Scale, hardware: &Hardware, gpus: &[u32]) -> f64 {

@@ -2,8 +2,10 @@
 
 use std::time::Duration;
 
-use super::bench::{Bench, Bound, Result, calibrate, or_missing, per_ns, record};
+use super::bench::{Bench, Bound, Result, calibrate, per_ns, record};
 use crate::hardware::{GpuParameterId, Parameter};
+
+pub(super) const NAMES: [GpuParameterId; 1] = [GpuParameterId::ArithmeticGflopPerS];
 
 const SOURCE: &str = include_str!("shaders/arithmetic.wgsl");
 
@@ -13,16 +15,12 @@ const OPERATIONS: f64 = 512.0;
 /// Most rounds in a dispatch: 2^20 take seconds on the slowest GPU, after which its driver gives up.
 const MOST_ROUNDS: u32 = 1 << 20;
 
-pub(super) fn measure(bench: &Bench<'_>) -> Vec<Parameter> {
-    or_missing(&[GpuParameterId::ArithmeticGflopPerS], arithmetic(bench))
-}
-
-fn arithmetic(bench: &Bench<'_>) -> Result<Vec<Parameter>> {
+pub(super) fn measure(bench: &Bench<'_>) -> Result<Vec<Parameter>> {
     let target = Duration::from_micros(bench.pick(4000, 12_000) / if bench.options.brief { 8 } else { 1 });
     let work = Arithmetic::new(bench, target)?;
     let method =
         "multiply-adds in eight independent chains of four lanes an invocation, each counted as two operations";
-    let named = [(GpuParameterId::ArithmeticGflopPerS, method.to_owned())];
+    let named = [(NAMES[0], method.to_owned())];
     bench.options.plan(9, bench.pick(150, 250)).measure(named, || Ok([work.rate(bench)?]))
 }
 

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::bench::{Bench, Result, calibrate, or_missing, per_ns};
+use super::bench::{Bench, Result, calibrate, per_ns};
 use crate::hardware::{GpuParameterId, Parameter};
 
 const SOURCE: &str = include_str!("shaders/memory.wgsl");
@@ -21,11 +21,7 @@ const BRIEF: u64 = 1 << 20;
 /// Most dispatches or copies in one submission.
 const MOST_COMMANDS: u32 = 4096;
 
-const NAMES: [GpuParameterId; 2] = [GpuParameterId::ReadGbPerS, GpuParameterId::CopyGbPerS];
-
-pub(super) fn measure(bench: &Bench<'_>, heaps: &[u64]) -> Vec<Parameter> {
-    or_missing(&NAMES, bandwidths(bench, heaps))
-}
+pub(super) const NAMES: [GpuParameterId; 2] = [GpuParameterId::ReadGbPerS, GpuParameterId::CopyGbPerS];
 
 /// The largest power of two up to `wanted` that the limits of the device and an eighth of its memory allow for one of
 /// two buffers.
@@ -36,7 +32,7 @@ fn set_bytes(wanted: u64, limits: &wgpu::Limits, heaps: &[u64]) -> u64 {
     1 << limit.max(GROUP_BYTES).ilog2()
 }
 
-fn bandwidths(bench: &Bench<'_>, heaps: &[u64]) -> Result<Vec<Parameter>> {
+pub(super) fn measure(bench: &Bench<'_>, heaps: &[u64]) -> Result<Vec<Parameter>> {
     let wanted = if bench.options.brief { BRIEF } else { bench.pick(LARGEST, LARGEST_SOFTWARE) };
     let bytes = set_bytes(wanted, bench.gpu.limits(), heaps);
     let groups = u32::try_from(bytes / GROUP_BYTES).unwrap_or(u32::MAX);

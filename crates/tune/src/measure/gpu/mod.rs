@@ -14,10 +14,10 @@ mod transfer;
 
 use std::time::{Duration, Instant};
 
-use super::Options;
+use super::{Options, in_order};
 use crate::hardware::{GpuGroup, GpuHardware, GpuParameterId, Parameter};
 use arithmetic::Arithmetic;
-use bench::Bench;
+use bench::{Bench, or_missing};
 use sapwise_gpu::{Gpu, GpuError, GpuErrorKind, Gpus};
 
 /// How long a real GPU works before anything is timed: an idle GPU clocks down.
@@ -53,25 +53,20 @@ pub fn gpu(gpus: &Gpus, index: u32, options: &Options) -> Result<GpuHardware, Gp
     if options.limit.is_none() {
         measured.extend(reported::measure(&bench, &heaps, executes > 0.0));
     }
-    let find = |id: GpuParameterId| {
-        let found = Parameter::find(&measured, id).cloned();
-        found.unwrap_or_else(|| Parameter::missing(id, &absent))
-    };
-    let parameters = GpuParameterId::OF_ONE.into_iter().map(find).collect();
-    Ok(GpuHardware::new(opened.identity().clone(), parameters))
+    Ok(GpuHardware::new(opened.identity().clone(), in_order(&GpuParameterId::OF_ONE, &measured, &absent)))
 }
 
 /// The parameters that take the GPU's time.
 fn timed(opened: &Gpu, options: &Options, heaps: &[u64], began: Instant) -> Vec<Parameter> {
-    let part = |parts: usize, measure: &dyn Fn(&Bench<'_>) -> Vec<Parameter>| {
-        measure(&Bench::new(opened, &options.share(began, parts)))
+    let part = |parts: usize, names: &[GpuParameterId], measure: &dyn Fn(&Bench<'_>) -> bench::Result<_>| {
+        or_missing(names, measure(&Bench::new(opened, &options.share(began, parts))))
     };
     // Arithmetic is the shortest part and takes the time that the others leave.
     [
-        part(4, &transfer::measure),
-        part(3, &|bench| memory::measure(bench, heaps)),
-        part(2, &latency::measure),
-        part(1, &arithmetic::measure),
+        part(4, &transfer::NAMES, &transfer::measure),
+        part(3, &memory::NAMES, &|bench| memory::measure(bench, heaps)),
+        part(2, &latency::NAMES, &latency::measure),
+        part(1, &arithmetic::NAMES, &arithmetic::measure),
     ]
     .concat()
 }

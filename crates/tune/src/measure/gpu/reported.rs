@@ -5,6 +5,7 @@ use std::time::Duration;
 use super::arithmetic::Arithmetic;
 use super::bench::Bench;
 use crate::hardware::{GpuParameterId, Parameter};
+use crate::measure::in_order;
 
 const NAMES: [GpuParameterId; 4] =
     [GpuParameterId::MemoryBytes, GpuParameterId::ClockGhz, GpuParameterId::Processors, GpuParameterId::Lanes];
@@ -25,7 +26,7 @@ pub(super) fn measure(bench: &Bench<'_>, heaps: &[u64], executes: bool) -> Vec<P
         let bytes = heaps.iter().sum::<u64>() as f64;
         found.push(Parameter::reported(GpuParameterId::MemoryBytes, bytes, "Vulkan, sum of the device-local heaps"));
     }
-    NAMES.map(|id| Parameter::find(&found, id).cloned().unwrap_or_else(|| Parameter::missing(id, &why))).to_vec()
+    in_order(&NAMES, &found, &why)
 }
 
 /// Asks NVIDIA's driver, with the GPU at work: an idle GPU clocks down.

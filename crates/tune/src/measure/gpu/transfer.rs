@@ -6,7 +6,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::bench::{Bench, Result, broken, not_mapped, or_missing, per_ns};
+use super::bench::{Bench, Result, broken, not_mapped, per_ns};
 use crate::hardware::{GpuParameterId, Parameter};
 use crate::measure::filled;
 use sapwise::internals::splitmix;
@@ -18,18 +18,14 @@ const TOTAL_BYTES: u64 = 33_554_432;
 /// Sizes of the line, from 4 KiB to 64 MiB.
 const SIZES: [u64; 8] = [1 << 12, 1 << 14, 1 << 16, 1 << 18, 1 << 20, 1 << 23, TOTAL_BYTES, 1 << 26];
 
-const NAMES: [GpuParameterId; 4] = [
+pub(super) const NAMES: [GpuParameterId; 4] = [
     GpuParameterId::UploadGbPerS,
     GpuParameterId::UploadRateGbPerS,
     GpuParameterId::DownloadGbPerS,
     GpuParameterId::DownloadRateGbPerS,
 ];
 
-pub(super) fn measure(bench: &Bench<'_>) -> Vec<Parameter> {
-    or_missing(&NAMES, transfers(bench))
-}
-
-fn transfers(bench: &Bench<'_>) -> Result<Vec<Parameter>> {
+pub(super) fn measure(bench: &Bench<'_>) -> Result<Vec<Parameter>> {
     let largest = *SIZES.iter().max().unwrap_or(&TOTAL_BYTES);
     let mut transfer = Transfer::new(bench, largest)?;
     // First use of the pages and of the driver's copy path, and a proof that the bytes arrive.
