@@ -71,13 +71,13 @@ pub(crate) fn make_folder(folder: &Path) -> anyhow::Result<()> {
         .with_context(|| format!("the folder {} can't be made; name another", folder.display()))
 }
 
-/// Refuses a picture that is no SVG by its name.
+/// Refuses a file whose name promises another format than the one it gets.
 ///
 /// # Errors
-/// [`WrongUsage`] that names the file.
-pub(crate) fn check_picture(path: &Path) -> Result<(), WrongUsage> {
+/// [`WrongUsage`] that names the option, the file and the ending.
+pub(crate) fn check_ending(option: &str, path: &Path, ending: &str) -> Result<(), WrongUsage> {
     match path.extension() {
-        Some(ending) if ending == "svg" => Ok(()),
-        _ => Err(WrongUsage(format!("--plot {}: name a file that ends in .svg", path.display()))),
+        Some(own) if own == ending => Ok(()),
+        _ => Err(WrongUsage(format!("{option} {}: name a file that ends in .{ending}", path.display()))),
     }
 }

@@ -1,6 +1,7 @@
 //! Made-up machines whose costs are known exactly. TEST DATA: the reports carry a real label because training leaves
 //! simulated ones out, so none of them may leave this module's tests.
 
+use crate::data::Profile;
 use crate::fit::components;
 use crate::report::{Label, Point, Provenance, Report, Timed, Timing};
 use sapwise::AlgorithmId;
@@ -25,6 +26,11 @@ pub(crate) struct Machine {
     /// Standard deviation of the logarithm of a sample.
     pub(crate) noise: f64,
     pub(crate) frames: usize,
+}
+
+/// The profiles of some machines, named after them.
+pub(crate) fn profiles(machines: impl IntoIterator<Item = Machine>) -> Vec<Profile> {
+    machines.into_iter().map(|m| Profile::of(&format!("{}.json", m.name), &m.report())).collect()
 }
 
 /// A made-up GPU: latencies in ns, rates in GB/s, and thousands of millions of operations a second.

@@ -239,7 +239,9 @@ impl<E: Exchange> Distributed<E> {
         // pairs, which are exact: candidates are estimated from a few hundred boxes and would add noise.
         let work = regional.map_or(1.0, |load| predict(&mean.rescaled(load.objects, load.pairs)) / predict(&mean));
         let own = FACTORS.map(time).into_iter().chain([work, pair_cost(&mean, &predict)]);
-        let all = gather(&mut self.exchange, own, FACTORS.len() + 2);
+        let words = gather(&mut self.exchange, &own.map(f64::to_bits).collect::<Vec<_>>());
+        let numbers = |words: &[u64]| words.iter().map(|&v| f64::from_bits(v)).collect();
+        let all: Vec<Vec<f64>> = words.chunks_exact(FACTORS.len() + 2).map(numbers).collect();
         let times: Vec<_> = all.iter().map(|words| std::array::from_fn(|k| words[k])).collect();
         let pair_cost = all.iter().map(|words| words[FACTORS.len() + 1]).sum::<f64>() / ranks as f64;
         // The boxes of the last frame, because their pairs are known, unless the scene has changed.
@@ -395,22 +397,19 @@ impl<E: Exchange> Distributed<E> {
     }
 }
 
-/// Returns the `each` numbers of every rank.
-fn gather(exchange: &mut impl Exchange, own: impl Iterator<Item = f64>, each: usize) -> Vec<Vec<f64>> {
-    // Only one rank has something other than 0 in each place, so the sum is its number.
-    let mut words = vec![0; each * exchange.size()];
-    let at = each * exchange.rank();
-    words[at..at + each].iter_mut().zip(own).for_each(|(word, v)| *word = v.to_bits());
+/// Returns the words of all ranks, those of the lowest first.
+fn gather(exchange: &mut impl Exchange, own: &[u64]) -> Vec<u64> {
+    // Only one rank has something other than 0 in each place, so the sum is its word.
+    let mut words = vec![0; own.len() * exchange.size()];
+    let at = own.len() * exchange.rank();
+    words[at..at + own.len()].copy_from_slice(own);
     exchange.sum(&mut words);
-    words.chunks_exact(each).map(|w| w.iter().map(|&v| f64::from_bits(v)).collect()).collect()
+    words
 }
 
 /// Returns the error of the lowest rank that has one, on every rank.
 fn agree(exchange: &mut impl Exchange, own: Outcome) -> Result<(), Error> {
-    let mut words = vec![0; 2 * exchange.size()];
-    let at = 2 * exchange.rank();
-    words[at..at + 2].copy_from_slice(&own);
-    exchange.sum(&mut words);
+    let words = gather(exchange, &own);
     let error = words.chunks_exact(2).enumerate().find_map(|(rank, w)| error_of(rank, [w[0], w[1]]));
     error.map_or(Ok(()), Err)
 }

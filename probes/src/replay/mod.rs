@@ -12,7 +12,7 @@ pub(crate) use frame_source::{FrameSource, Swing};
 pub(crate) use outcome::{Outcome, Part, Times};
 pub(crate) use race::{ReplaySettings, replay, too_wide};
 pub(crate) use samples::WINDOW;
-pub(crate) use trace::{check_trace, write_trace};
+pub(crate) use trace::write_trace;
 
 #[cfg(test)]
 mod tests;

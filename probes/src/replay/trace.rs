@@ -1,23 +1,11 @@
 //! The table of a replay, one row a frame.
 
 use super::outcome::Outcome;
-use crate::exit::WrongUsage;
 use sapwise::Reason;
 use sapwise::algorithm::Load;
 use sapwise_lab::write::write_atomically;
 use std::io::Write;
 use std::path::Path;
-
-/// Refuses a file whose name promises another format than CSV.
-///
-/// # Errors
-/// Names the ending that it takes.
-pub(crate) fn check_trace(path: &Path) -> Result<(), WrongUsage> {
-    match path.extension().and_then(|e| e.to_str()) {
-        Some("csv") => Ok(()),
-        _ => Err(WrongUsage(format!("--trace {}: name a file that ends in .csv", path.display()))),
-    }
-}
 
 /// Writes one row a frame: the choice of the last repeat, and times over all repeats.
 ///

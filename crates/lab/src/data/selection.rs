@@ -8,7 +8,7 @@ use sapwise::algorithm::BackendClass;
 use std::collections::{BTreeMap, HashMap};
 
 /// What shares a revision: a method on one class of processor.
-type Key = (BackendClass, String);
+pub(crate) type MethodKey = (BackendClass, String);
 
 /// The reports that can be trained on, added one by one so that none has to stay in memory.
 #[derive(Debug, Clone, Default)]
@@ -63,7 +63,7 @@ impl Selection {
     pub fn finish(mut self) -> (Vec<Profile>, Vec<String>) {
         self.keep_apart();
         let newest = newest_revisions(&self.profiles);
-        let newest_of = |id: &AlgorithmId| newest.get(&key(id)).copied().unwrap_or(0);
+        let newest_of = |id: &AlgorithmId| newest.get(&method_key(id)).copied().unwrap_or(0);
         for profile in &mut self.profiles {
             let stale = profile.algorithms.iter().filter(|t| t.revision < newest_of(&t.id));
             let file = &profile.file;
@@ -114,15 +114,15 @@ fn refusal(report: &Report) -> Option<String> {
     Some(why.to_owned())
 }
 
-fn key(id: &AlgorithmId) -> Key {
+pub(crate) fn method_key(id: &AlgorithmId) -> MethodKey {
     (id.backend().class(), id.method().to_owned())
 }
 
 /// Returns the newest revision of each method on each class of processor.
-fn newest_revisions(profiles: &[Profile]) -> BTreeMap<Key, u32> {
+fn newest_revisions(profiles: &[Profile]) -> BTreeMap<MethodKey, u32> {
     let mut newest = BTreeMap::new();
     for timed in profiles.iter().flat_map(|p| &p.algorithms) {
-        let known = newest.entry(key(&timed.id)).or_insert(timed.revision);
+        let known = newest.entry(method_key(&timed.id)).or_insert(timed.revision);
         *known = timed.revision.max(*known);
     }
     newest

@@ -17,7 +17,7 @@ const BEYOND: f64 = 2.0;
 pub(super) struct MeasuredCrossovers {
     pub(super) scenario: String,
     loads: Vec<Load>,
-    crossovers: Vec<Crossover>,
+    pub(super) crossovers: Vec<Crossover>,
 }
 
 impl MeasuredCrossovers {
@@ -37,11 +37,6 @@ impl MeasuredCrossovers {
             sides.is_some_and(|(below, above)| ln_ratio(&loads, BEYOND * c.objects, below, above) > COSTS.ln())
         });
         Some(Self { scenario: scenario.to_owned(), loads, crossovers })
-    }
-
-    /// Returns the crossovers.
-    pub(super) fn crossovers(&self) -> &[Crossover] {
-        &self.crossovers
     }
 
     /// Returns the [nearest](Self::nearest) predicted crossing of each crossover whose algorithms have predicted costs.

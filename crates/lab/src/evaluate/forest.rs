@@ -1,19 +1,16 @@
 //! A random forest for the time of each method, the baseline that knows no physics.
 
 use super::regret_table::Strategy;
-use crate::data::{COMPARED, COMPARED_OF_GPUS, Profile};
+use crate::data::{COMPARED, COMPARED_OF_GPUS, MethodKey, Profile, method_key};
 use crate::fit::{Row, rows, thinned};
 use anyhow::{Context, Result};
 use sapwise::AlgorithmId;
-use sapwise::algorithm::{Backend, BackendClass, Load};
+use sapwise::algorithm::{Backend, Load};
 use sapwise_scenes::Random;
 use sapwise_tune::Hardware;
 use smartcore::ensemble::random_forest_regressor::{RandomForestRegressor, RandomForestRegressorParameters};
 use smartcore::linalg::basic::matrix::DenseMatrix;
 use std::collections::BTreeMap;
-
-/// A method on one class of processor.
-type Key = (BackendClass, String);
 
 /// Trees of a forest.
 const TREES: usize = 25;
@@ -29,7 +26,7 @@ const LEAF: usize = 8;
 const SEED: u64 = 1;
 
 /// The rows of every method, for all forests.
-pub(super) struct Table(BTreeMap<Key, Vec<Example>>);
+pub(super) struct Table(BTreeMap<MethodKey, Vec<Example>>);
 
 struct Example {
     profile: usize,
@@ -45,11 +42,11 @@ impl Table {
     pub(super) fn new(profiles: &[Profile]) -> Self {
         let step = profiles.len().div_ceil(MOST_PROFILES).max(1);
         let most = (MOST_ROWS / profiles.len().div_ceil(step).max(1)).max(FEWEST_OF_PROFILE);
-        let mut table: BTreeMap<Key, Vec<Example>> = BTreeMap::new();
+        let mut table: BTreeMap<MethodKey, Vec<Example>> = BTreeMap::new();
         for (k, profile) in profiles.iter().enumerate().step_by(step) {
-            let mut own: BTreeMap<Key, Vec<Row>> = BTreeMap::new();
+            let mut own: BTreeMap<MethodKey, Vec<Row>> = BTreeMap::new();
             for row in rows(profile, k, None) {
-                own.entry(key(profile.id(row.algorithm))).or_default().push(row);
+                own.entry(method_key(profile.id(row.algorithm))).or_default().push(row);
             }
             for (key, rows) in own {
                 let example = |r: Row| Example {
@@ -85,13 +82,13 @@ impl Table {
 }
 
 /// A forest for each method of the training.
-pub(super) struct Forests(BTreeMap<Key, Forest>);
+pub(super) struct Forests(BTreeMap<MethodKey, Forest>);
 
 impl Forests {
     /// Chooses the algorithm with the least predicted time.
     pub(super) fn chooser<'a>(&'a self, hardware: &'a Hardware, available: &'a [AlgorithmId]) -> Strategy<'a> {
         Box::new(move |load| {
-            let ln_ns = |id: &AlgorithmId| self.0.get(&key(id))?.ln_ns(&features(hardware, id.backend(), load));
+            let ln_ns = |id: &AlgorithmId| self.0.get(&method_key(id))?.ln_ns(&features(hardware, id.backend(), load));
             let costs = available.iter().filter_map(|id| Some((id, ln_ns(id)?)));
             costs.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(id, _)| id.clone())
         })
@@ -122,10 +119,6 @@ impl Forest {
     }
 }
 
-fn key(id: &AlgorithmId) -> Key {
-    (id.backend().class(), id.method().to_owned())
-}
-
 /// Returns what a tree may split by: the load, the number of threads or GPUs, and the logarithms of the parameters
 /// that machines are compared by, on GPUs those of the first one. A missing parameter is zero.
 fn features(hardware: &Hardware, backend: &Backend, load: &Load) -> Vec<f64> {
@@ -154,11 +147,7 @@ fn features(hardware: &Hardware, backend: &Backend, load: &Load) -> Vec<f64> {
 mod tests {
     use super::*;
     use crate::evaluate::regret_table::RegretTable;
-    use crate::synthetic::Machine;
-
-    fn profiles() -> Vec<Profile> {
-        Machine::family_with_gpus().into_iter().map(|m| Profile::of(m.name, &m.report())).collect()
-    }
+    use crate::synthetic::{Machine, profiles};
 
     /// Mean regret on the last machine of forests that were grown from `chosen`.
     fn regret(profiles: &[Profile], chosen: &[bool]) -> f64 {
@@ -170,7 +159,7 @@ mod tests {
 
     #[test]
     fn forests_choose_well_on_a_machine_that_they_saw_and_on_another_and_always_alike() {
-        let all = profiles();
+        let all = profiles(Machine::family_with_gpus());
         let mut others = vec![true; all.len()];
         others[all.len() - 1] = false;
         let (seen, unseen) = (regret(&all, &vec![true; all.len()]), regret(&all, &others));
@@ -180,7 +169,7 @@ mod tests {
 
     #[test]
     fn what_left_the_race_is_not_chosen_beyond() {
-        let all = profiles();
+        let all = profiles(Machine::family_with_gpus());
         let forests = Table::new(&all).grow(&vec![true; all.len()], |_, _| false).unwrap();
         let available = all[2].available();
         let choose = forests.chooser(&all[2].hardware, &available);

@@ -1,7 +1,6 @@
 //! Regrets and crossovers of what was held out, for figures and tables.
 
 use super::crossovers::ComparedCrossover;
-use super::scores::{Judged, regrets_of_units};
 use crate::training::Regrets;
 
 /// The held-out machines.
@@ -35,10 +34,4 @@ pub struct HeldOutCrossover {
     pub scenario: String,
     /// Where it was measured, and where it was predicted.
     pub compared: ComparedCrossover,
-}
-
-impl HeldOut {
-    pub(super) fn new(all: &[Judged], crossovers: Vec<HeldOutCrossover>, by_machine: bool) -> Self {
-        Self { regrets: regrets_of_units(all, by_machine), crossovers }
-    }
 }

@@ -3,6 +3,7 @@
 use super::crossovers::MeasuredCrossovers;
 use crate::data::{COMPARED, COMPARED_OF_GPUS, Profile, figure};
 use crate::fit::measured_costs;
+use crate::spread::range;
 use rayon::prelude::*;
 use sapwise::AlgorithmId;
 use sapwise::algorithm::{Backend, BackendClass, Entry};
@@ -94,7 +95,7 @@ fn of_profile<'a>(profile: &'a Profile, model: &Model) -> Vec<(String, Found<'a>
         .collect();
     let mut all = Vec::new();
     for own in MeasuredCrossovers::of_scenarios(profile, &measured_costs(profile).0) {
-        for crossover in own.crossovers() {
+        for crossover in &own.crossovers {
             let Some(name) = name(crossover) else { continue };
             let predicted = own.nearest(crossover, &base).filter(|c| c.crosses).map(|c| c.predicted);
             let octaves = |objects: f64, costs: Option<&Vec<AlgorithmCost>>| {
@@ -175,11 +176,8 @@ fn of_crossover(name: &str, rows: &[Found<'_>]) -> Vec<Influence> {
         let slopes: Vec<f64> = rows.iter().filter_map(|r| r.by_model.get(&parameter).copied()).collect();
         let by_model = median(&slopes).filter(|octaves| octaves.abs() >= LEAST_OCTAVES)?;
         let by_data = slope(rows, &parameter, None).map(|all| {
-            let without = hosts.iter().filter_map(|host| slope(rows, &parameter, Some(host)));
-            let ends = without.fold(None, |ends: Option<(f64, f64)>, s| {
-                Some(ends.map_or((s, s), |(low, high)| (low.min(s), high.max(s))))
-            });
-            Slope { all, without_one: ends.filter(|_| hosts.len() > 1) }
+            let without: Vec<f64> = hosts.iter().filter_map(|host| slope(rows, &parameter, Some(host))).collect();
+            Slope { all, without_one: range(&without).filter(|_| hosts.len() > 1).map(<(f64, f64)>::from) }
         });
         let undecided = undecided(rows, &parameter, hosts.len(), by_data);
         let (crossover, reports, hosts) = (name.to_owned(), files.len(), hosts.len());
@@ -219,10 +217,7 @@ fn undecided(rows: &[Found<'_>], parameter: &str, hosts: usize, slope: Option<Sl
     let mut profiles: Vec<&Profile> = rows.iter().map(|r| r.profile).collect();
     profiles.dedup_by_key(|p| &p.file);
     let values = |name: &str| profiles.iter().map(|p| log2(p, name)).collect::<Option<Vec<f64>>>();
-    let ratio = |values: &[f64]| {
-        let ends = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |e, v| (e.0.min(*v), e.1.max(*v)));
-        (ends.1 - ends.0).exp2()
-    };
+    let ratio = |values: &[f64]| range(values).map_or(0.0, |[low, high]| (high - low).exp2());
     let Some(own) = values(parameter) else { return Some("not measured everywhere".to_owned()) };
     if ratio(&own) < LEAST_RATIO {
         return Some(format!("varies by {:.2}×", ratio(&own)));
@@ -250,11 +245,7 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::fit::{Designs, model};
-    use crate::synthetic::Machine;
-
-    fn family() -> Vec<Profile> {
-        Machine::family().iter().map(|m| Profile::of(m.name, &m.report())).collect()
-    }
+    use crate::synthetic::{Machine, profiles};
 
     /// Crossovers of two scenarios that go down by 0.7 octaves when the lanes double.
     fn rows(profiles: &[Profile]) -> Vec<Found<'_>> {
@@ -271,7 +262,7 @@ mod tests {
 
     #[test]
     fn a_slope_is_found_whatever_the_scenario_and_the_host() {
-        let profiles = family();
+        let profiles = profiles(Machine::family());
         let found = of_crossover("a → b", &rows(&profiles));
         let lanes = found.iter().find(|i| i.parameter == "simd_lanes").unwrap();
         assert_eq!((lanes.reports, lanes.hosts, lanes.by_model, &lanes.undecided), (7, 7, -0.7, &None));
@@ -286,7 +277,7 @@ mod tests {
 
     #[test]
     fn what_the_hosts_can_not_decide_is_said() {
-        let profiles = family();
+        let profiles = profiles(Machine::family());
         let of = |profiles: &[Profile], parameter: &str| {
             let rows = rows(profiles);
             let (all, hosts) = (slope(&rows, parameter, None).unwrap_or_default(), profiles.len());
@@ -302,7 +293,7 @@ mod tests {
 
     #[test]
     fn a_model_moves_the_crossovers_as_its_terms_say() {
-        let profiles = family();
+        let profiles = profiles(Machine::family());
         let model = model(&Designs::new(&profiles), &vec![true; profiles.len()], "test").unwrap().0;
         let found = influences(&profiles, &model);
         assert!(found.windows(2).all(|w| w[0].reports >= w[1].reports), "{found:?}");

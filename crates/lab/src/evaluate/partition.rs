@@ -53,17 +53,13 @@ fn grouped(profiles: &[Profile], key: impl Fn(&Profile) -> String) -> Vec<Vec<us
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::synthetic::Machine;
-
-    fn profiles(machines: &[Machine]) -> Vec<Profile> {
-        machines.iter().map(|m| Profile::of("", &m.report())).collect()
-    }
+    use crate::synthetic::{Machine, profiles};
 
     #[test]
     fn machines_are_held_out_with_all_their_profiles() {
         let mut machines = Machine::family();
         machines[1].name = machines[0].name;
-        let partition = Partition::new(&profiles(&machines));
+        let partition = Partition::new(&profiles(machines));
         assert_eq!(partition.folds, [vec![0, 1], vec![2], vec![3], vec![4], vec![5], vec![6]]);
         assert!(partition.by_machine && partition.held_out == "physical machine");
     }
@@ -73,7 +69,7 @@ mod tests {
         let mut machines = Machine::family();
         machines.truncate(4);
         machines.iter_mut().for_each(|m| m.name = "0000000000000001");
-        let all = profiles(&machines);
+        let all = profiles(machines);
         // Lanes 8, 4, 8, 16 and threads 2, 4, 8, 8.
         let partition = Partition::new(&all);
         assert_eq!(partition.folds, [vec![1], vec![0, 2], vec![3], vec![0], vec![1], vec![2, 3]]);

@@ -107,7 +107,8 @@ pub fn validate(
         floor: chance,
         coverage: covered,
     };
-    Ok(Validated { validation, notes, held_out: HeldOut::new(&all, crossovers, partition.by_machine) })
+    let regrets = scores::regrets_of_units(&all, partition.by_machine);
+    Ok(Validated { validation, notes, held_out: HeldOut { regrets, crossovers } })
 }
 
 /// The results on one fold.

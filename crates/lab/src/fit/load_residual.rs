@@ -288,12 +288,8 @@ fn weights(root: &Array2<f64>, blocks: &[Array2<f64>], right: &[Array1<f64>]) ->
 mod tests {
     use super::*;
     use crate::data::Spot;
-    use crate::synthetic::Machine;
+    use crate::synthetic::{Machine, profiles};
     use sapwise::internals::Residual;
-
-    fn profiles() -> Vec<Profile> {
-        Machine::family().into_iter().take(2).map(|m| Profile::of(m.name, &m.report())).collect()
-    }
 
     /// The residual at a position, of machines with these positions that were timed at all points of a profile with
     /// these remainders.
@@ -328,7 +324,7 @@ mod tests {
 
     #[test]
     fn places_are_loads_of_the_profiles_and_none_twice() {
-        let all = profiles();
+        let all = profiles(Machine::family().into_iter().take(2));
         let found = places(&all, None);
         assert!(found.loads().len() >= 20 && found.loads().len() <= Places::MOST);
         for (k, load) in found.loads().iter().enumerate() {
@@ -341,7 +337,7 @@ mod tests {
 
     #[test]
     fn a_smooth_remainder_is_found_and_a_far_timing_is_held_back() {
-        let all = profiles();
+        let all = profiles(Machine::family().into_iter().take(2));
         let truth = |l: &Load| {
             0.3 * (f64::from(l.objects).log2() / 4.0).sin() + 0.1 * (l.pairs / f64::from(l.objects)).min(1.0)
         };
@@ -356,7 +352,7 @@ mod tests {
 
     #[test]
     fn a_new_machine_gets_what_machines_of_its_kind_share() {
-        let all = profiles();
+        let all = profiles(Machine::family().into_iter().take(2));
         // The mean over all loads at a position, of machines with these remainders and positions.
         let at = |machines: &[(f64, f64)], position: f64| {
             let positions: Vec<f64> = machines.iter().map(|m| m.1).collect();
@@ -390,7 +386,7 @@ mod tests {
 
     #[test]
     fn without_rows_nothing_is_corrected() {
-        let all = profiles();
+        let all = profiles(Machine::family().into_iter().take(2));
         let basis = Basis::new(Arc::new(places(&all, None)));
         let groups = Groups::new(&[], &[0, 1], &basis.features(&all), true);
         assert_eq!(groups.residual(&basis, |_| true, &[]).unwrap(), (Vec::new(), Vec::new()));

@@ -2,6 +2,7 @@
 
 use super::designs::{Designs, Fitted};
 use crate::data::{COMPARED, COMPARED_OF_GPUS, Profile, is_real};
+use crate::spread;
 use anyhow::{Result, bail};
 use sapwise::algorithm::Backend;
 use sapwise_tune::model::{GPU_PREFIX, Range};
@@ -40,8 +41,7 @@ fn ranges(profiles: &[&Profile]) -> Vec<Range> {
 }
 
 fn range(parameter: String, values: Vec<f64>) -> Option<Range> {
-    let min = values.iter().copied().min_by(f64::total_cmp)?;
-    let max = values.iter().copied().max_by(f64::total_cmp)?;
+    let [min, max] = spread::range(&values)?;
     Some(Range { parameter, min, max })
 }
 
@@ -57,16 +57,12 @@ fn timed_gpus(profile: &Profile) -> impl Iterator<Item = &GpuHardware> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::synthetic::Machine;
+    use crate::synthetic::{Machine, profiles};
     use sapwise_tune::GpuKind;
 
     #[test]
     fn the_ranges_of_gpus_are_of_the_real_ones_where_there_is_one() {
-        let mut all: Vec<Profile> = Machine::family_with_gpus()
-            .into_iter()
-            .take(2)
-            .map(|m| Profile::of(&format!("{}.json", m.name), &m.report()))
-            .collect();
+        let mut all = profiles(Machine::family_with_gpus().into_iter().take(2));
         let of_gpus = |profiles: &[Profile]| -> Vec<(f64, f64)> {
             let ranges = ranges(&profiles.iter().collect::<Vec<_>>());
             ranges.iter().filter(|r| r.parameter.starts_with(GPU_PREFIX)).map(|r| (r.min, r.max)).collect()

@@ -1,7 +1,7 @@
 //! Objects that keep a velocity or are held by a point: `clustered`, `brownian`, `gravity`.
 
 use super::rng::{Rng, cube_root, signed3};
-use super::walk::reflect;
+use super::walk::{fly, reflect};
 use sapwise::Aabb;
 
 /// Half the edge of every object here.
@@ -97,13 +97,7 @@ impl Brownian {
                 *velocity = signed3(rng.bits()).map(|u| u * Self::SPEED);
             }
             (bits, left) = (bits / Self::CHANGE, left - 1);
-            for a in 0..3 {
-                let ahead = centre[a] + velocity[a];
-                if ahead.abs() > self.wall {
-                    velocity[a] = -velocity[a];
-                }
-                centre[a] = reflect(ahead, self.wall);
-            }
+            fly(centre, velocity, self.wall);
             *aabb = Aabb::cube(*centre, HALF);
         }
     }

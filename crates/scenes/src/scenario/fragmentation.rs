@@ -6,7 +6,7 @@
 
 use super::Scenario;
 use super::rng::{Powers, Rng, cube_root};
-use super::walk::reflect;
+use super::walk::{fly, reflect};
 use sapwise::Aabb;
 
 /// Cubes at the beginning of a cycle, or the peak where that is lower.
@@ -100,13 +100,7 @@ impl Fragmentation {
             self.begin(rng);
         }
         for (centre, velocity) in self.centres.iter_mut().zip(&mut self.velocities) {
-            for a in 0..3 {
-                let ahead = centre[a] + velocity[a];
-                if ahead.abs() > self.wall {
-                    velocity[a] = -velocity[a];
-                }
-                centre[a] = reflect(ahead, self.wall);
-            }
+            fly(centre, velocity, self.wall);
         }
         let target = self.target(frame);
         while self.centres.len() < target {

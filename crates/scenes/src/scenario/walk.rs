@@ -119,6 +119,18 @@ impl Walk {
     }
 }
 
+/// Moves a centre by its velocity, which turns around on each axis at a wall.
+#[inline]
+pub(super) fn fly(centre: &mut [f32; 3], velocity: &mut [f32; 3], wall: f32) {
+    for a in 0..3 {
+        let ahead = centre[a] + velocity[a];
+        if ahead.abs() > wall {
+            velocity[a] = -velocity[a];
+        }
+        centre[a] = reflect(ahead, wall);
+    }
+}
+
 /// Reflects a coordinate at the walls at -`wall` and `wall`. One that is beyond by more than the world ends at a
 /// wall.
 #[inline]

@@ -1,11 +1,7 @@
 use super::*;
 use crate::evaluate::{OURS, SINGLE_BEST};
 use crate::progress::Silent;
-use crate::synthetic::Machine;
-
-fn profiles(machines: Vec<Machine>) -> Vec<Profile> {
-    machines.into_iter().map(|m| Profile::of(&format!("{}.json", m.name), &m.report())).collect()
-}
+use crate::synthetic::{Machine, profiles};
 
 fn validated(profiles: &[Profile]) -> (Validation, Vec<String>) {
     let partition = Partition::new(profiles);

@@ -2,15 +2,11 @@ use super::*;
 use crate::fit::rows::{Row, rows};
 use crate::fit::weights::weights;
 use crate::report::Label;
-use crate::synthetic::{Machine, gpu_truth, truth};
+use crate::synthetic::{Machine, gpu_truth, profiles, truth};
 use sapwise::AlgorithmId;
 use sapwise::tuning::Term;
 use sapwise_tune::hardware::{GpuParameterId, ParameterId};
 use sapwise_tune::{GpuKind, Model};
-
-fn profiles(machines: impl IntoIterator<Item = Machine>) -> Vec<Profile> {
-    machines.into_iter().map(|m| Profile::of(&format!("{}.json", m.name), &m.report())).collect()
-}
 
 fn fitted(profiles: &[Profile]) -> (Vec<MethodModel>, Vec<String>) {
     let (model, notes) = whole(profiles);
