@@ -8,7 +8,7 @@
 #   tools/c.sh header      # writes bindings/c/include/sapwise.h
 #
 # Needs compilers, valgrind and Bullet; `install` also cargo-c, CMake and Meson. On Debian it installs what is missing.
-# Everything goes into target/c/.
+# Everything goes into target/c/; what cargo builds goes into target/bindings/, as for Python and MPI.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 what=${1:-test}
@@ -18,7 +18,7 @@ manifest=bindings/c/Cargo.toml
 examples=$root/bindings/c/examples
 bullet=(-std=c++17 -isystem /usr/include/bullet "$examples/bullet.cpp" -lBulletDynamics -lBulletCollision -lLinearMath)
 fail() { echo "c: $*" >&2; exit 1; }
-export CARGO_INCREMENTAL=0 CARGO_TARGET_DIR=$folder/build
+export CARGO_INCREMENTAL=0 CARGO_TARGET_DIR=${folder%/c}/bindings
 mkdir -p "$folder"
 
 # Installs Debian's packages if a command or Bullet is missing.

@@ -15,7 +15,8 @@ has_libclang() { compgen -G '/usr/lib/llvm-*/lib/libclang.so*' >/dev/null || [ -
 }
 
 manifest=bindings/mpi/Cargo.toml
-export CARGO_INCREMENTAL=0 CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-target}/mpi
+# What is built for the C library and the Python package too is built once.
+export CARGO_INCREMENTAL=0 CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-target}/bindings
 cargo fmt --manifest-path $manifest --check
 cargo clippy --manifest-path $manifest --all-targets --locked --quiet -- -D warnings
 RUSTDOCFLAGS="-D warnings" cargo doc --manifest-path $manifest --no-deps --locked --quiet

@@ -10,7 +10,8 @@
 #   tools/python.sh examples   # runs bindings/python/examples/ and writes their pictures to target/python/examples/
 #   tools/python.sh index      # writes the index of docs/python.md from the docstrings
 #
-# Needs Python 3.10 or later with venv (Debian: python3-venv). Everything goes into target/python/. PYTHON names the interpreter.
+# Needs Python 3.10 or later with venv (Debian: python3-venv). Everything goes into target/python/; what cargo
+# builds goes into target/bindings/, as for C and MPI. PYTHON names the interpreter.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 what=${1:-test}
@@ -21,7 +22,7 @@ fail() { echo "python: $*" >&2; exit 1; }
 "$python" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 10))' 2>/dev/null \
     || fail "$python must be Python 3.10 or later with venv: install python3-venv, or set PYTHON"
 mkdir -p "$folder"
-export PIP_DISABLE_PIP_VERSION_CHECK=1 CARGO_TARGET_DIR=$folder/build CARGO_INCREMENTAL=0
+export PIP_DISABLE_PIP_VERSION_CHECK=1 CARGO_TARGET_DIR=${folder%/python}/bindings CARGO_INCREMENTAL=0
 pip() { local environment=$1; shift; "$environment/bin/python" -m pip install --quiet "$@"; }
 
 # maturin stays from run to run.
