@@ -58,7 +58,7 @@ impl Slots {
 
     pub(super) fn reserve(&mut self, more: usize) -> Result<(), Error> {
         let room = more.saturating_sub(self.free.len());
-        let most = self.boxes.len() + room;
+        let most = self.boxes.len().saturating_add(room);
         if u32::try_from(most).is_err() {
             return Err(Error::TooManyObjects { objects: most });
         }
@@ -196,6 +196,8 @@ impl Slots {
     /// Frees the slots of removed bodies. The lowest is used again first, whatever else was done to the bodies.
     pub(super) fn free(&mut self) {
         self.leaving.sort_unstable_by(|a, b| b.cmp(a));
+        // After an update that failed they are taken again.
+        self.leaving.dedup();
         for slot in self.leaving.drain(..) {
             let of = &mut self.slots[slot as usize];
             // 0 is no generation.

@@ -242,3 +242,20 @@ fn threads_may_query_at_once() {
         }
     });
 }
+
+#[test]
+fn slot_of_a_removed_body_is_freed_once_after_a_failed_update() {
+    let mut space = Space::new();
+    let at = |x: f32| Aabb::cube([x, 0.0, 0.0], 1.0);
+    let [a, _, c] = [0.0, 0.5, 9.0].map(|x| space.insert(at(x), Body::default()).unwrap());
+    space.update().unwrap();
+    space.remove(c).unwrap();
+    space.set_limit(Some(0));
+    assert_eq!(space.update(), Err(Error::TooManyPairs { limit: 0 }));
+    space.set_limit(None);
+    space.set(a, at(0.1)).unwrap();
+    space.update().unwrap();
+    let [x, y] = [20.0, 20.5].map(|x| space.insert(at(x), Body::default()).unwrap());
+    space.update().unwrap();
+    assert_eq!((x != y, space.len(), space.begun()), (true, 4, &[(x.min(y), x.max(y))][..]));
+}
