@@ -51,6 +51,10 @@ impl Space {
             }
         };
         let resting = self.resting.tree().map(|tree| (tree, None));
+        // The last update, or the clone, found no memory for their tree.
+        if resting.is_none() && self.resting.len() > 0 {
+            return Err(Error::OutOfMemory { what: "resting bodies", elements: self.resting.len() });
+        }
         Ok(std::iter::once((active, Some(&self.active.slots[..]))).chain(resting))
     }
 }
