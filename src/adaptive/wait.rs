@@ -28,7 +28,7 @@ impl Wait {
     /// Takes in a frame that waited.
     pub(super) fn add(&mut self, ns: f64, frame: u64) {
         let last = self.last.replace(frame);
-        if last.is_some_and(|last| frame - last <= APART) {
+        if last.is_some_and(|last| frame.saturating_sub(last) <= APART) {
             (self.mean_ns, self.at) = (self.ns(frame) + WEIGHT * ns, frame);
         }
     }
@@ -38,5 +38,18 @@ impl Wait {
         if self.mean_ns > 0.0 {
             (self.mean_ns, self.at) = ((1.0 - WEIGHT).powf(f64::from(frames)) * self.ns(frame), frame);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clone_that_goes_on_from_an_earlier_frame_may_wait() {
+        let mut wait = Wait::default();
+        wait.add(64.0e3, 100);
+        wait.add(64.0e3, 90);
+        assert_eq!(wait.ns(90), 500.0);
     }
 }
