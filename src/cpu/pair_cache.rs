@@ -17,7 +17,7 @@ mod tree;
 
 use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, FrameKind, FrameWork, check_count};
-use crate::clock::{Instant, elapsed_ns};
+use crate::clock::{Instant, measured_ns, tells};
 use crate::cpu::Threads;
 use crate::cpu::level::Simd;
 use crate::cpu::outputs::Outputs;
@@ -127,7 +127,8 @@ impl BroadPhase for PairCache {
             pairs.clear();
             let Self { workers, tree, upkeep, outputs, .. } = self;
             let took = upkeep.find(&mut tree.tree, workers, (plan, boxes), outputs, pairs)?;
-            self.motion.found_from_scratch(boxes.len(), pairs.overlapping(), took as f32);
+            let took = Some(took).filter(|each| tells(each * boxes.len() as f64)).map(|each| each as f32);
+            self.motion.found_from_scratch(boxes.len(), pairs.overlapping(), took);
             self.last_frame = FrameKind::FromScratch;
         } else {
             self.motion.found(boxes.len(), pairs.overlapping());
@@ -195,7 +196,9 @@ impl PairCache {
         let again = motion.next_to_shrink(boxes.len());
         let changes = grown.check(workers, boxes, margin, again, pairs.filter(), shares)?;
         // A renewal takes some frames. If the tree has eight places for three boxes before it ends, all is made again.
-        let rebuilt = motion.wants_rebuild(boxes.len(), &changes) || tree.tree.is_sparse(2 * boxes.len());
+        let rebuilt = changes.new.start == 0
+            || motion.wants_rebuild(boxes.len(), &changes)
+            || tree.tree.is_sparse(2 * boxes.len());
         *last_frame = if rebuilt { FrameKind::Rebuilt } else { FrameKind::Updated };
         if rebuilt {
             grown.grow_all(workers, boxes, motion.renew(plan, boxes, &changes), shares);
@@ -236,7 +239,7 @@ impl PairCache {
         let kept_pairs: usize = kept.iter().map(Pairs::len).sum();
         let most_kept = motion.most_kept(boxes.len());
         let did = Work { kept_pairs, nodes: looked.into_inner(), rebuilt };
-        let took = elapsed_ns(started) as f32 / boxes.len().max(1) as f32;
+        let took = measured_ns(started).map(|ns| ns as f32 / boxes.len().max(1) as f32);
         let pays = motion.learn(boxes.len(), &changes, &did, took);
         Ok(match (kept_pairs <= most_kept && kept.iter().all(Pairs::is_complete), pays) {
             (false, _) => Kept::Incomplete,
@@ -273,6 +276,18 @@ mod tests {
         assert_eq!(kinds(Scenario::Uniform, &unknown), [FromScratch, Rebuilt, Updated, Updated]);
         assert_eq!(kinds(Scenario::Uniform, &known), [Rebuilt, Updated, Updated, Updated]);
         assert_eq!(kinds(Scenario::Fast, &unknown), [FromScratch; 4]);
+    }
+
+    #[test]
+    fn frame_without_a_box_keeps_no_pair_of_an_earlier_one() {
+        let mut method = pair_cache(&[1], &Threads::default(), Simd::Portable, false).unwrap();
+        let mut pairs = Pairs::new();
+        for boxes in [20, 0, 20].map(|count| vec![Aabb::cube([0.0; 3], 1.0); count]) {
+            let overlapping = boxes.len() * boxes.len().saturating_sub(1) / 2;
+            let plan = FramePlan::default().with_moved(Some(0.0)).with_pairs(Some(0.0));
+            method.find_pairs_with(&plan, &boxes, &mut pairs).unwrap();
+            assert_eq!(pairs.len(), overlapping);
+        }
     }
 
     #[test]

@@ -178,7 +178,8 @@ impl Motion {
         } else {
             self.keeping = self.begin(plan, boxes);
             self.prices.fade(1 + u64::from(self.next_pause));
-            if self.keeping.is_some() {
+            if let Some(keeping) = self.keeping {
+                self.prices.begin(keeping.cost, self.scratch(boxes.len()));
                 (self.next_pause, self.displacement) = (0, Displacement::default());
                 return;
             }
@@ -194,10 +195,16 @@ impl Motion {
         self.density = Some(pairs as f32 / objects.max(1) as f32);
     }
 
-    /// Learns from a frame from scratch with this many pairs, which took `took` nanoseconds for each box.
-    pub(super) fn found_from_scratch(&mut self, objects: usize, pairs: u64, took: f32) {
+    /// The cost of a box from scratch, by the model.
+    fn scratch(&self, objects: usize) -> f32 {
+        cost::scratch(cost::far(objects), self.density.unwrap_or_default())
+    }
+
+    /// Learns from a frame from scratch with this many pairs, which took `took` nanoseconds for each box, if the clock
+    /// could tell.
+    pub(super) fn found_from_scratch(&mut self, objects: usize, pairs: u64, took: Option<f32>) {
         self.found(objects, pairs);
-        self.prices.add_scratch(took, cost::scratch(cost::far(objects), self.density.unwrap_or_default()));
+        self.prices.add_scratch(took, self.scratch(objects));
     }
 
     /// Keeping failed, because there were too many pairs to keep or because it did not pay.
@@ -297,11 +304,12 @@ impl Motion {
         })
     }
 
-    /// Learns from a frame in which boxes left as `changes` says and which took `took` nanoseconds for each box.
+    /// Learns from a frame in which boxes left as `changes` says and which took `took` nanoseconds for each box, if the
+    /// clock could tell.
     /// `false` when keeping does not pay any more.
-    pub(super) fn learn(&mut self, objects: usize, changes: &Changes, did: &Work, took: f32) -> bool {
+    pub(super) fn learn(&mut self, objects: usize, changes: &Changes, did: &Work, took: Option<f32>) -> bool {
         let far = cost::far(objects);
-        let scratch = cost::scratch(far, self.density.unwrap_or_default());
+        let scratch = self.scratch(objects);
         let Some(k) = &mut self.keeping else { return false };
         let share = |count: usize| count as f32 / objects.max(1) as f32;
         let (left, kept, rebuilt) = (share(changes.left), share(did.kept_pairs), did.rebuilt);
@@ -356,19 +364,19 @@ impl Motion {
         Some((moved as f32, density))
     }
 
-    /// Begins to keep pairs if that promises to pay.
+    /// Returns how to keep pairs if that promises to pay.
     fn begin(&mut self, plan: &FramePlan, boxes: &[Aabb]) -> Option<Keeping> {
         let (motion, density) = self.known(plan, boxes)?;
         self.density = Some(density);
         let far = cost::far(boxes.len());
-        let scratch = cost::scratch(far, density);
+        let scratch = self.scratch(boxes.len());
         let density = density.max(FEWEST_PAIRS);
         let kept = |m: f32| density * (1.0 + 2.0 * m).powi(3);
         let cost = |m: f32| cost::tests(far, kept(m)) + cost::AGAIN + cost::left(far, NODES) * cost::leaving(motion, m);
         let margins = MARGINS.into_iter().filter(|&m| m <= self.most_margin);
         let best = margins.min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(MARGINS[0]);
         let kept = kept(best);
-        if kept >= MOST_KEPT || !self.prices.begins(motion, cost(best), scratch) {
+        if kept >= MOST_KEPT || !self.prices.promise(motion, cost(best), scratch) {
             return None;
         }
         Some(Keeping {

@@ -30,7 +30,7 @@ const FORGETTING: f32 = 512.0;
 /// of another machine, but it knows how costs change with the scene.
 #[derive(Debug, Clone)]
 pub(super) struct Prices {
-    /// Without a clock, frames take what the model says.
+    /// Without a clock, and if it is too coarse, a frame takes what the model says.
     timed: bool,
     /// By number of threads, and the one in use: a second thread that is slow to wake says nothing of the first.
     widths: Vec<OfWidth>,
@@ -49,7 +49,8 @@ pub(super) struct Prices {
 struct Failure {
     /// The work of keeping over the promised one.
     over: f32,
-    /// How far boxes moved in a frame after it, in edges, once that is known. Slower boxes are kept more cheaply.
+    /// How far boxes moved in a frame after it, in edges, once that is known; infinite if other algorithms ran then.
+    /// Slower boxes are kept more cheaply.
     pace: Option<f32>,
 }
 
@@ -87,8 +88,8 @@ impl Prices {
     }
 
     /// Learns from a frame from scratch, of which the model says `model`.
-    pub(super) fn add_scratch(&mut self, took: f32, model: f32) {
-        let took = if self.timed { took } else { model };
+    pub(super) fn add_scratch(&mut self, took: Option<f32>, model: f32) {
+        let took = took.filter(|_| self.timed).unwrap_or(model);
         let of = self.now();
         of.frames = of.frames.saturating_add(1);
         let cost = f64::from(took / model);
@@ -99,26 +100,28 @@ impl Prices {
         }
     }
 
-    /// Begins a try of keeping boxes of this pace if it is worth one by what the model says, and returns whether. The
-    /// clock ends a try that does not pay, which counts, less and less, for the next ones.
-    pub(super) fn begins(&mut self, pace: f32, keeping: f32, scratch: f32) -> bool {
+    /// Returns whether a try of keeping boxes of this pace is worth it by what the model says. The clock ends a try that
+    /// does not pay, which counts, less and less, for the next ones.
+    pub(super) fn promise(&mut self, pace: f32, keeping: f32, scratch: f32) -> bool {
         let failed_at = f64::from(*self.failure.pace.get_or_insert(pace));
         let is_slower = f64::from(pace) < failed_at && !is_same_pace(pace.into(), failed_at);
         let over = if is_slower { self.failure.over.min(WARY) } else { self.failure.over };
         let OfWidth { frames, keeping: measured, .. } = *self.now();
         let measured = measured.get().unwrap_or(1.0) as f32;
-        let begins = over * measured * keeping < scratch && (!self.timed || frames >= FEWEST_FRAMES);
-        if begins {
-            // The frame that builds is not counted.
-            (self.lost, self.promised, self.kept) = (0.0, [keeping, scratch], [0.0, -1.0]);
-        }
-        begins
+        over * measured * keeping < scratch && (!self.timed || frames >= FEWEST_FRAMES)
+    }
+
+    /// Begins a try that promised this.
+    pub(super) fn begin(&mut self, keeping: f32, scratch: f32) {
+        // The frame that builds is not counted.
+        (self.lost, self.promised, self.kept) = (0.0, [keeping, scratch], [0.0, -1.0]);
     }
 
     /// Frames go by in which no pairs are kept.
     pub(super) fn fade(&mut self, frames: u64) {
         let kept = (-(frames as f64) / f64::from(FORGETTING)).exp();
         let faded = |over: f64| 1.0 + (over - 1.0) * kept;
+        self.failure.pace.get_or_insert(f32::INFINITY);
         self.failure.over = faded(self.failure.over.into()) as f32;
         self.widths.iter_mut().for_each(|w| w.keeping = MeanTime::of(w.keeping.get().map_or(1.0, faded)));
     }
@@ -141,10 +144,10 @@ impl Prices {
 
     /// Learns from a frame with kept pairs. `work`, `scratch`: what the model says of it, and of one from scratch.
     /// Returns whether to go on.
-    pub(super) fn pays(&mut self, took: f32, work: f32, scratch: f32) -> bool {
+    pub(super) fn pays(&mut self, took: Option<f32>, work: f32, scratch: f32) -> bool {
         let of_scratch = self.of_scratch();
         let (expected, scratch) = (work * of_scratch, scratch * of_scratch);
-        let took = if self.timed { took } else { expected };
+        let took = took.filter(|_| self.timed).unwrap_or(expected);
         let mut most = MOST_OF_FIRST * scratch;
         self.kept[1] += 1.0;
         if self.kept[1] > 0.0 {
@@ -163,13 +166,21 @@ impl Prices {
 mod tests {
     use super::*;
 
+    fn begins(prices: &mut Prices, pace: f32, keeping: f32, scratch: f32) -> bool {
+        let begins = prices.promise(pace, keeping, scratch);
+        if begins {
+            prices.begin(keeping, scratch);
+        }
+        begins
+    }
+
     /// After frames from scratch that took 50 ns a box, of which the model says 40, and the beginning of a try that
     /// promises to take 30 instead. Boxes move by a tenth of an edge.
     fn keeping(widths: usize, width: usize) -> Prices {
         let mut prices = Prices::new(true, widths);
         prices.set_width(width);
-        (0..10).for_each(|_| prices.add_scratch(50.0, 40.0));
-        assert!(prices.begins(0.1, 30.0, 40.0) && prices.pays(200.0, 90.0, 40.0));
+        (0..10).for_each(|_| prices.add_scratch(Some(50.0), 40.0));
+        assert!(begins(&mut prices, 0.1, 30.0, 40.0) && prices.pays(Some(200.0), 90.0, 40.0));
         prices
     }
 
@@ -177,20 +188,20 @@ mod tests {
     fn keeping_is_tried_after_six_frames_and_stops_when_it_has_lost_four() {
         let mut prices = Prices::new(true, 1);
         for frame in 0..6 {
-            assert!(!prices.begins(0.1, 10.0, 40.0));
+            assert!(!begins(&mut prices, 0.1, 10.0, 40.0));
             // The tree is built, and one frame is interrupted.
-            prices.add_scratch(if frame < 2 || frame == 4 { 500.0 } else { 50.0 }, 40.0);
+            prices.add_scratch(Some(if frame < 2 || frame == 4 { 500.0 } else { 50.0 }), 40.0);
         }
-        assert!(!prices.begins(0.1, 41.0, 40.0) && prices.begins(0.1, 39.0, 40.0));
+        assert!(!begins(&mut prices, 0.1, 41.0, 40.0) && begins(&mut prices, 0.1, 39.0, 40.0));
         // The first frame builds. Then half a frame is saved in each.
-        assert!(prices.pays(1500.0, 90.0, 40.0));
-        assert!((0..1000).all(|k| prices.pays(if k % 50 == 0 { 150.0 } else { 25.0 }, 10.0, 40.0)));
+        assert!(prices.pays(Some(1500.0), 90.0, 40.0));
+        assert!((0..1000).all(|k| prices.pays(Some(if k % 50 == 0 { 150.0 } else { 25.0 }), 10.0, 40.0)));
         // A tenth more in each frame is a reason to stop.
-        let frames = (0..1000).take_while(|_| prices.pays(55.0, 10.0, 40.0)).count();
+        let frames = (0..1000).take_while(|_| prices.pays(Some(55.0), 10.0, 40.0)).count();
         assert!((30..50).contains(&frames), "{frames}");
         // In a denser scene both cost more.
-        assert!(prices.begins(0.01, 15.0, 80.0));
-        assert!((0..1000).all(|_| prices.pays(90.0, 15.0, 80.0)));
+        assert!(begins(&mut prices, 0.01, 15.0, 80.0));
+        assert!((0..1000).all(|_| prices.pays(Some(90.0), 15.0, 80.0)));
     }
 
     #[test]
@@ -199,7 +210,7 @@ mod tests {
             let mut prices = keeping(1, 0);
             let pays = |k: &u32| {
                 let (took, work) = if k % every == 0 { (5000.0, work) } else { (40.0, 30.0) };
-                prices.pays(took, work, 40.0)
+                prices.pays(Some(took), work, 40.0)
             };
             (0..1000).take_while(pays).count()
         };
@@ -210,19 +221,19 @@ mod tests {
 
     /// The first promise, of those that fall by one, for which keeping would begin.
     fn begins_at(prices: &Prices, pace: f32) -> i32 {
-        (0..40).rev().find(|&keeping| prices.clone().begins(pace, keeping as f32, 40.0)).unwrap()
+        (0..40).rev().find(|&keeping| begins(&mut prices.clone(), pace, keeping as f32, 40.0)).unwrap()
     }
 
     #[test]
     fn slow_frames_count_for_the_next_promises() {
         let mut prices = keeping(1, 0);
-        while prices.pays(52.0, 30.0, 40.0) {}
+        while prices.pays(Some(52.0), 30.0, 40.0) {}
         prices.failed(false);
         // Frames took 1.39 times what their work promised.
         assert_eq!([0.1, 0.01].map(|pace| begins_at(&prices, pace)), [26; 2]);
         let waits = |_: &u32| {
             prices.fade(1);
-            !prices.begins(0.1, 30.0, 40.0)
+            !begins(&mut prices, 0.1, 30.0, 40.0)
         };
         let frames = (0..10_000).take_while(waits).count();
         assert!((150..500).contains(&frames), "{frames}");
@@ -231,13 +242,17 @@ mod tests {
     #[test]
     fn more_work_than_promised_counts_unless_boxes_move_more_slowly() {
         let mut prices = keeping(1, 0);
-        while prices.pays(75.0, 60.0, 40.0) {}
+        while prices.pays(Some(75.0), 60.0, 40.0) {}
         prices.failed(false);
         // Kept pairs were twice the promised work, at this pace.
-        assert!(!prices.begins(0.1, 30.0, 40.0));
+        assert!(!begins(&mut prices, 0.1, 30.0, 40.0));
         assert_eq!([0.1, 0.2, 0.09, 0.01].map(|pace| begins_at(&prices, pace)), [18, 18, 18, 36]);
         prices.failed(true);
         assert_eq!([0.1, 0.01].map(|pace| begins_at(&prices, pace)), [13; 2]);
+        // Other algorithms ran in the frames after it: at which pace it failed is unknown.
+        prices.failed(false);
+        prices.fade(1);
+        assert_eq!([0.1, 0.01].map(|pace| begins_at(&prices, pace)), [36; 2]);
         prices.fade(10_000);
         assert_eq!(begins_at(&prices, 0.1), 39);
     }
@@ -245,20 +260,20 @@ mod tests {
     #[test]
     fn slow_frames_on_two_threads_do_not_count_on_one() {
         let mut prices = keeping(2, 1);
-        while prices.pays(90.0, 30.0, 40.0) {}
+        while prices.pays(Some(90.0), 30.0, 40.0) {}
         prices.failed(false);
         assert!(begins_at(&prices, 0.1) < 25);
         prices.set_width(0);
-        assert!(!prices.begins(0.1, 10.0, 40.0), "no frame from scratch has run on one thread");
-        (0..6).for_each(|_| prices.add_scratch(50.0, 40.0));
+        assert!(!begins(&mut prices, 0.1, 10.0, 40.0), "no frame from scratch has run on one thread");
+        (0..6).for_each(|_| prices.add_scratch(Some(50.0), 40.0));
         assert_eq!(begins_at(&prices, 0.1), 36);
     }
 
     #[test]
     fn without_a_clock_the_model_decides() {
         let mut prices = Prices::new(false, 1);
-        assert!(prices.begins(0.1, 39.0, 40.0) && !prices.begins(0.1, 41.0, 40.0));
-        assert!((0..100).all(|_| prices.pays(1.0e9, 39.0, 40.0)));
-        assert!(!(0..100).all(|_| prices.pays(0.0, 43.0, 40.0)));
+        assert!(begins(&mut prices, 0.1, 39.0, 40.0) && !begins(&mut prices, 0.1, 41.0, 40.0));
+        assert!((0..100).all(|_| prices.pays(Some(1.0e9), 39.0, 40.0)));
+        assert!(!(0..100).all(|_| prices.pays(Some(0.0), 43.0, 40.0)));
     }
 }
