@@ -1,5 +1,6 @@
 //! The class `BroadPhase`.
 
+use crate::boxes::Boxes;
 use crate::engine::two_columns;
 use crate::frame::{Flat, Frames, Ids};
 use crate::{Held, Keywords, PyTuning, Start, boxes, call, exception, learning_methods, start, unusable};
@@ -67,7 +68,41 @@ pub(crate) struct PyBroadPhase {
     filter: Mutex<Option<Arc<Vec<Membership>>>>,
 }
 
+/// A frame that can be searched: its boxes, their ids and the filter.
+type Ready<'py> = (Boxes<'py>, Ids, Option<Arc<Vec<Membership>>>);
+
 impl PyBroadPhase {
+    /// Checks what `find` got.
+    fn ready<'py>(
+        &self,
+        boxes: &Bound<'py, PyAny>,
+        upper: Option<&Bound<'py, PyAny>>,
+        ids: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Ready<'py>> {
+        let py = boxes.py();
+        let given = self::boxes(boxes, upper, "")?;
+        given.warn_if_rounded(py)?;
+        let count = given.as_slice()?.len();
+        let ids = match ids {
+            None => Ids::Positions,
+            Some(ids) => {
+                let ids = call(py, "sapwise._arrays", "ids", (ids, count))?;
+                Ids::Given(ids.cast::<PyArray1<i64>>()?.to_vec()?)
+            }
+        };
+        py.check_signals()?;
+        let filter = self.filter().clone();
+        if let Some(filter) = filter.as_ref().filter(|f| f.len() != count) {
+            let text = format!(
+                "the filter is for {} boxes and there are {count}; call set_filter with one entry a box, or without \
+                 arguments to lift it",
+                filter.len(),
+            );
+            return Err(unusable(py, text));
+        }
+        Ok((given, ids, filter))
+    }
+
     fn filter(&self) -> MutexGuard<'_, Option<Arc<Vec<Membership>>>> {
         self.filter.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -147,29 +182,15 @@ impl PyBroadPhase {
         ids: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArray2<u32>>> {
         let py = boxes.py();
-        let given = self::boxes(boxes, upper, "")?;
-        given.warn_if_rounded(py)?;
-        let boxes = given.as_slice()?;
-        let ids = match ids {
-            None => Ids::Positions,
-            Some(ids) => {
-                let ids = call(py, "sapwise._arrays", "ids", (ids, boxes.len()))?;
-                Ids::Given(ids.cast::<PyArray1<i64>>()?.to_vec()?)
-            }
-        };
-        py.check_signals()?;
-        let filter = self.filter().clone();
-        if let Some(filter) = filter.as_ref().filter(|f| f.len() != boxes.len()) {
-            let text = format!(
-                "the filter is for {} boxes and there are {}; call set_filter with one entry a box, \
-                 or without arguments to lift it",
-                filter.len(),
-                boxes.len()
-            );
-            return Err(unusable(py, text));
+        let ready = self.ready(boxes, upper, ids);
+        if ready.is_err() {
+            self.frames.write(py, Frames::fail)?;
         }
+        let (given, ids, filter) = ready?;
+        let boxes = given.as_slice()?;
         let found = self.frames.write(py, |frames| {
             if frames.has_other_ids(&ids) {
+                frames.fail();
                 return None;
             }
             Some(frames.find(boxes, ids, filter.as_ref()))

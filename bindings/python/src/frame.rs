@@ -82,6 +82,11 @@ impl Frames {
         self.count > 0 && std::mem::discriminant(ids) != std::mem::discriminant(&self.frames[self.now].ids)
     }
 
+    /// The next frame was refused: nothing has begun or ended.
+    pub(crate) fn fail(&mut self) {
+        self.failed = true;
+    }
+
     /// Finds the pairs of the next frame.
     pub(crate) fn find(
         &mut self,

@@ -67,16 +67,21 @@ impl<T: Searcher> Held<T> {
             let state = self.state();
             (state.searcher.clone(), state.pid == pid)
         };
-        let Some(known) = known else {
-            return Err(failed(py, format!("this {} is closed; make another one", T::CLASS)));
-        };
+        let closed = || failed(py, format!("this {} is closed; make another one", T::CLASS));
+        let known = known.ok_or_else(closed)?;
         if made_here {
             return Ok(known);
         }
-        // After a fork this process has one thread.
         let made = T::forked(&known, start::adaptive(py, &self.start)?, &self.start).map_err(|why| failed(py, why))?;
         let made = Arc::new(RwLock::new(made));
         let mut state = self.state();
+        // Other threads ran meanwhile.
+        if state.pid == pid || state.searcher.is_none() {
+            let first = state.searcher.clone();
+            drop(state);
+            py.detach(|| drop(made));
+            return first.ok_or_else(closed);
+        }
         std::mem::forget((known, state.searcher.replace(Arc::clone(&made))));
         state.pid = pid;
         Ok(made)

@@ -91,6 +91,14 @@ def test_a_frame_that_failed_leaves_no_trace():
         with pytest.raises(sapwise.InvalidBoxError):
             broad_phase.find(broken)
         assert len(broad_phase.begun()) == len(broad_phase.ended()) == 0
+        ids = range(300)
+        for wrong in ((broken.astype(float),), (boxes, None, ids), (boxes, None, [1, 1]), (boxes[:, :5],)):
+            broad_phase.find(moved)
+            broad_phase.find(boxes)
+            assert len(broad_phase.begun()) > 0
+            with pytest.raises((ValueError, sapwise.InputError)):
+                broad_phase.find(*wrong[:2], ids=wrong[2] if len(wrong) > 2 else None)
+            assert len(broad_phase.begun()) == len(broad_phase.ended()) == 0
         now = as_set(broad_phase.find(moved))
         before = as_set(naive(boxes))
         assert as_set(broad_phase.begun()) == now - before and as_set(broad_phase.ended()) == before - now

@@ -1,5 +1,6 @@
 """Threads, forks and Ctrl-C. Each in a process of its own, so that a deadlock fails instead of lasting."""
 
+import os
 import sys
 
 import pytest
@@ -86,6 +87,28 @@ with sapwise.BroadPhase(cache=False, measure=False) as broad_phase:
 stop.set(); thread.join(); print(answers)
 """
     assert run(HEAD + script).strip() == "60"
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
+def test_threads_that_meet_a_space_of_the_parent_at_once_make_one_of_it():
+    script = """
+import warnings; warnings.simplefilter('ignore')
+for _ in range(5):
+    space = sapwise.Space(cache=False, measure=False)
+    space.insert(cubes(10))
+    space.update()
+    child = os.fork()
+    if child == 0:
+        start = threading.Barrier(4)
+        def insert(): start.wait(); space.insert(cubes(10))
+        threads = [threading.Thread(target=insert) for _ in range(4)]
+        for t in threads: t.start()
+        for t in threads: t.join()
+        os._exit(0 if len(space) == 50 else 1)
+    assert os.waitpid(child, 0)[1] == 0
+print('fine')
+"""
+    assert run(HEAD + script).strip() == "fine"
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="threads are counted by what Linux tells")
