@@ -1,5 +1,6 @@
 //! What searches for `pairs` and `pairs_between`, kept from call to call.
 
+use crate::memory::most_pairs;
 use crate::{Corners, PyDecision, start, unusable};
 use numpy::IntoPyArray;
 use numpy::PyArray2;
@@ -32,6 +33,9 @@ pub(crate) struct Search<'a> {
     /// Subtracted from the second member of each pair.
     pub(crate) from_second: u32,
 }
+
+/// Boxes from which on the free memory is read again for the default limit. Fewer have at most 50 million pairs.
+const MANY: usize = 10_000;
 
 /// What is searched.
 pub(crate) enum What<'a> {
@@ -110,6 +114,16 @@ pub(crate) fn last_decision(py: Python<'_>) -> Option<PyDecision> {
     })
 }
 
+impl What<'_> {
+    /// Number of boxes.
+    fn len(&self) -> usize {
+        match self {
+            Self::All(boxes) | Self::By(_, boxes) | Self::Worlds(boxes, _) => boxes.len(),
+            Self::Between(a, b) => a.len() + b.len(),
+        }
+    }
+}
+
 impl Idle {
     fn take_decision(&mut self) -> Option<PyDecision> {
         self.decision.take().or_else(|| self.engines.last().and_then(Engine::decision))
@@ -140,7 +154,9 @@ impl Engine {
         let list = &mut self.pairs[usize::from(order == PairOrder::Canonical)];
         let mut pairs = list.take().unwrap_or_else(|| start::pairs(order, None));
         let usual_limit = pairs.limit();
-        pairs.set_limit(search.limit.or(usual_limit));
+        let limit = search.limit.or_else(|| if search.what.len() < MANY { usual_limit } else { most_pairs() });
+        // Pairs that only rounding has made do not count.
+        pairs.set_limit(if search.exactly.is_some() { usual_limit } else { limit });
         pairs.set_filter(search.filter);
         let found = self.run(search.what, &mut pairs);
         pairs.set_limit(usual_limit);
@@ -160,6 +176,9 @@ impl Engine {
                 exactly.as_ref().is_none_or(|by| by.corners[0].meet(*a, &by.corners[1], *b, by.margin))
             };
             kept.extend(own.filter(wanted));
+            if let Some(limit) = limit.filter(|&limit| kept.len() > limit) {
+                return Err(Error::TooManyPairs { limit });
+            }
             if places.is_some() && search.order == PairOrder::Canonical {
                 kept.sort_unstable();
             }

@@ -251,8 +251,13 @@ def test_too_many_pairs_are_an_exception():
     limited = sapwise.BroadPhase(cache=False, measure=False, limit=1000)
     with limited as broad_phase, pytest.raises(sapwise.TooManyPairsError):
         broad_phase.find(boxes)
+    # Only rounded to 32 bits would the first two meet.
+    boxes = np.array([[0, 0, 0, 1, 1, 1], [1 + 1e-12, 0, 0, 2, 1, 1], [2, 0, 0, 3, 1, 1]])
+    assert sapwise.pairs(boxes, limit=1).tolist() == [[1, 2]]
+    with pytest.raises(sapwise.TooManyPairsError, match="limit of 0"):
+        sapwise.pairs(boxes, limit=0)
     # Two million pairs need not be refused: the limit follows the memory.
-    assert len(sapwise.pairs(boxes[:2001])) == 2001 * 1000
+    assert len(sapwise.pairs(np.zeros((2001, 6), np.float32))) == 2001 * 1000
 
 
 def test_a_crowd_whose_pairs_fill_no_memory():
