@@ -3,6 +3,7 @@
 import doctest
 import importlib.util
 import inspect
+import re
 import subprocess
 import sys
 from importlib import resources
@@ -44,6 +45,18 @@ def test_the_index_in_the_documents_is_that_of_the_docstrings():
     assert module.index() in document, "write it again: tools/python.sh index"
     for name in PUBLIC:
         assert f"`{name}`" in document
+
+
+def test_the_code_of_the_guide_runs_from_top_to_bottom(tmp_path):
+    guide = (ROOT / "docs/python.md").read_text()
+    code = "\n".join(re.findall(r"```python\n(.*?)```", guide, re.DOTALL))
+    # Takes a minute, and needs the command.
+    probe = "sapwise.probe_report"
+    assert probe in code
+    lines = [line for line in code.splitlines() if not line.startswith(probe)]
+    ends = "print(begun.tolist(), len(ended), len(pairs), len(hits), len(handles), tuning.fields[0][0])"
+    printed = run("\n".join([*lines, ends]), XDG_CACHE_HOME=str(tmp_path))
+    assert printed.splitlines()[-1] == "[] 0 0 2 2 0"
 
 
 def test_nothing_heavy_comes_with_the_import():
