@@ -13,14 +13,19 @@ use sapwise::{Aabb, BroadPhase, Filter, Membership, PairOrder, Pairs, Space};
 const BOXES: usize = if cfg!(miri) { 18 } else { 40 };
 
 /// Frames of a scene.
-const FRAMES: usize = if cfg!(miri) { 2 } else { 4 };
+const FRAMES: usize = if cfg!(miri) { 3 } else { 4 };
 
 /// Compares each frame with the double loop, without and with a filter, then moves the boxes, removes two and adds one.
 fn assert_frames_agree(name: &str, mut boxes: Vec<Aabb>, algorithms: &mut [(String, Box<dyn BroadPhase>)]) {
     let mut random = Random(41);
     for frame in 0..FRAMES {
         let memberships: Vec<Membership> = (0..boxes.len()).map(|_| random.membership()).collect();
-        for memberships in [Vec::new(), memberships] {
+        let mut filters = vec![Vec::new(), memberships];
+        // Under Miri frames with and without a filter alternate: some scenes begin with one, others without.
+        if cfg!(miri) {
+            filters.remove((frame + name.len()) % 2);
+        }
+        for memberships in filters {
             let expected = naive_filtered(&boxes, &memberships);
             let mut pairs = Pairs::with_order(PairOrder::Canonical);
             pairs.set_filter((!memberships.is_empty()).then(|| Filter::new(memberships)));
@@ -80,7 +85,7 @@ fn one_scene_after_another() {
         assert_frames_agree("a lattice", lattice().into_iter().step_by(3).take(BOXES).collect(), &mut algorithms);
         assert_frames_agree("the same box", vec![Aabb::cube([3.0; 3], 1.0); 20], &mut algorithms);
     }
-    for count in (2..18).step_by(if cfg!(miri) { 7 } else { 1 }) {
+    for count in (2..18).step_by(if cfg!(miri) { 8 } else { 1 }) {
         assert_frames_agree("a few boxes", random.cubes(count, [2.0; 3], 0.5), &mut algorithms);
     }
 }
