@@ -3,7 +3,7 @@
 use crate::exit::WrongUsage;
 use crate::gpus::{self, GpuChoice};
 use crate::interrupt;
-use crate::progress::Progress;
+use crate::progress::{Progress, Steps as _};
 use sapwise::algorithm::usable_cores;
 use sapwise_tune::measure::{self, Family, Options};
 use sapwise_tune::{Hardware, Parameter};
@@ -33,7 +33,7 @@ fn measure_cpu(threads: Option<u32>) -> Hardware {
     let options = Options::default().with_threads(threads);
     let mut found: Vec<Parameter> = Vec::new();
     for family in Family::ALL {
-        progress.message(format!("hardware: {}", family.as_str()));
+        progress.message(&format!("hardware: {}", family.as_str()));
         if interrupt::requested() {
             let why = "interrupted before it was measured";
             found.extend(family.parameters().iter().map(|p| Parameter::missing(p, why)));

@@ -3,7 +3,7 @@
 use crate::algorithms::Algorithms;
 use crate::args::Predict;
 use crate::check::doubts;
-use crate::progress::Progress;
+use crate::progress::{Progress, Steps as _};
 use crate::{interrupt, output, revisions};
 use anyhow::bail;
 use sapwise::algorithm::{Load, usable_cores};
@@ -51,7 +51,7 @@ impl Slice {
     pub(crate) fn of(scenario: Scenario) -> anyhow::Result<Self> {
         let sizes: Vec<u32> = SLICE.map(size).collect();
         let progress = Progress::new(sizes.iter().map(|&n| u64::from(n)).sum());
-        progress.message(format!("pairs of the scenario {scenario}"));
+        progress.message(&format!("pairs of the scenario {scenario}"));
         let mut known = Vec::new();
         let done = |load: &Load| {
             known.push(*load);

@@ -3,6 +3,7 @@
 use crate::{interrupt, output};
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use sapwise_lab::progress::Interrupted;
+pub(crate) use sapwise_lab::progress::Progress as Steps;
 use std::fmt::{self, Write};
 use std::io::IsTerminal;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
@@ -38,16 +39,6 @@ impl Progress {
         Self { bar, showing }
     }
 
-    /// Shows what is being done.
-    pub(crate) fn message(&self, text: impl Into<String>) {
-        self.bar.set_message(text.into());
-    }
-
-    /// Adds steps that are done.
-    pub(crate) fn advance(&self, steps: u64) {
-        self.bar.inc(steps);
-    }
-
     /// Sets the number of steps that are done.
     pub(crate) fn position(&self, steps: u64) {
         self.bar.set_position(steps);
@@ -56,11 +47,6 @@ impl Progress {
     /// Sets the number of all steps.
     pub(crate) fn steps(&self, steps: u64) {
         self.bar.set_length(steps);
-    }
-
-    /// Warns while the bar is out of the way.
-    pub(crate) fn warn(&self, text: &str) {
-        self.aside(|| output::warn(text));
     }
 
     /// Prints something while the bar is out of the way.
@@ -93,22 +79,22 @@ fn show_later(bar: ProgressBar) -> Option<(Sender<()>, JoinHandle<()>)> {
     Some((alive, thread))
 }
 
-impl sapwise_lab::progress::Progress for Progress {
+impl Steps for Progress {
     fn start(&self, steps: u64) {
         self.bar.set_position(0);
         self.bar.set_length(steps);
     }
 
     fn advance(&self, steps: u64) {
-        Self::advance(self, steps);
+        self.bar.inc(steps);
     }
 
     fn message(&self, text: &str) {
-        Self::message(self, text);
+        self.bar.set_message(text.to_owned());
     }
 
     fn warn(&self, text: &str) {
-        Self::warn(self, text);
+        self.aside(|| output::warn(text));
     }
 
     fn check(&self) -> Result<(), Interrupted> {

@@ -4,7 +4,7 @@ use super::choice::{GpuChoice, uses};
 use super::look::look;
 use super::parameters::{group_without_parameters, inert, without_parameters};
 use crate::child::{Ended, answers};
-use crate::progress::Progress;
+use crate::progress::{Progress, Steps as _};
 use sapwise_lab::text::once;
 use sapwise_tune::{GpuGroup, GpuHardware, GpuIdentity, GpuParameterId};
 use serde::de::DeserializeOwned;
@@ -51,7 +51,7 @@ pub(crate) fn measure(choice: &GpuChoice, threads: Option<u32>) -> anyhow::Resul
     // One more for several GPUs together.
     progress.steps(taken.len() as u64 + 1);
     for identity in taken {
-        progress.message(format!("hardware: gpu{}", identity.index));
+        progress.message(&format!("hardware: gpu{}", identity.index));
         measured.gpu(identity, threads)?;
         progress.advance(1);
     }

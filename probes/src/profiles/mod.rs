@@ -9,7 +9,7 @@ use crate::child::{Ended, run_verb};
 use crate::exit::{Outcome, WrongUsage};
 use crate::flaw::flaw;
 use crate::outputs::make_folder;
-use crate::progress::Progress;
+use crate::progress::{Progress, Steps as _};
 use crate::{gpus, interrupt, output, shell};
 use anyhow::{Context, bail};
 use indicatif::HumanDuration;
@@ -55,7 +55,7 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
     let progress = Progress::new(waiting.iter().map(|p| p.time.as_secs()).sum());
     let (mut before, mut failed) = (Duration::ZERO, 0);
     for (k, profile) in waiting.iter().enumerate() {
-        progress.message(format!("{} of {}: {}", k + 1, waiting.len(), profile.name));
+        progress.message(&format!("{} of {}: {}", k + 1, waiting.len(), profile.name));
         if let Some(why) = folder.measure(profile, before, &progress)? {
             failed += 1;
             progress.aside(|| output::complain(&format!("{}: FAILED: {why}", profile.name)));

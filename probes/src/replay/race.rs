@@ -5,7 +5,7 @@ use super::other_work::OtherWork;
 use super::outcome::{Choice, Outcome, frames};
 use super::samples::Samples;
 use crate::interrupt;
-use crate::progress::Progress;
+use crate::progress::{Progress, Steps as _};
 use anyhow::{Context, bail};
 use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Pairs, Reason, Registry, Tuning};
 use sapwise_scenes::Random;
@@ -48,7 +48,7 @@ pub(crate) fn replay(settings: &ReplaySettings, tuning: &Tuning, registry: &Regi
     let progress = Progress::new((settings.repeats * settings.frames) as u64);
     let (mut watch, mut loads) = (Watch::begin(), Vec::new());
     for repeat in 0..settings.repeats {
-        progress.message(format!("{}: repeat {} of {}", settings.source.name(), repeat + 1, settings.repeats));
+        progress.message(&format!("{}: repeat {} of {}", settings.source.name(), repeat + 1, settings.repeats));
         let mut adaptive = race.begin(repeat, settings, tuning, registry)?;
         let mut choices = Vec::with_capacity(settings.frames);
         let mut cursor = settings.source.start();

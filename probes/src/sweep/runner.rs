@@ -4,7 +4,7 @@ use super::request::{Event, Schedule, SweepRequest};
 use super::visits::visits;
 use crate::child::{Ended, run_part};
 use crate::interrupt;
-use crate::progress::Progress;
+use crate::progress::{Progress, Steps as _};
 use anyhow::Context;
 use sapwise_lab::report::Point;
 use sapwise_lab::sweep::Plan;
@@ -88,7 +88,7 @@ struct Sweep<'a> {
 impl Sweep<'_> {
     /// Sweeps one scenario in a process of its own. Whether the sweep goes on.
     fn go(&mut self, scenario: &str, schedule: Schedule, time: Duration, round: u64) -> anyhow::Result<bool> {
-        self.progress.message(scenario.to_owned());
+        self.progress.message(scenario);
         match self.run(scenario, schedule, time, round)? {
             Ended::Well => {}
             Ended::Interrupted => {
@@ -137,7 +137,7 @@ impl Sweep<'_> {
             };
             match event {
                 Event::Point(point) => {
-                    progress.message(format!("{scenario}: {} objects done", point.load.objects));
+                    progress.message(&format!("{scenario}: {} objects done", point.load.objects));
                     progress.position(began.elapsed().min(plan.total).as_secs());
                     found.points.push(*point);
                 }

@@ -4,7 +4,7 @@ use crate::algorithms::Algorithms;
 use crate::args::Check;
 use crate::check::{Finding, Here};
 use crate::exit::Outcome;
-use crate::progress::Progress;
+use crate::progress::{Progress, Steps as _};
 use crate::terminal::Terminal;
 use crate::{output, shell};
 use sapwise_lab::data::report_files;

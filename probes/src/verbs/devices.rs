@@ -4,7 +4,7 @@ use crate::algorithms::Algorithms;
 use crate::args::Devices;
 use crate::exit::Outcome;
 use crate::gpus::{self, Seen, look};
-use crate::progress::Progress;
+use crate::progress::{Progress, Steps as _};
 use crate::terminal::Terminal;
 use crate::{output, shell};
 use sapwise::AlgorithmId;

@@ -3,7 +3,7 @@
 use crate::algorithms::Algorithms;
 use crate::args::Pairs as Arguments;
 use crate::exit::{Outcome, WrongUsage};
-use crate::progress::Progress;
+use crate::progress::{Progress, Steps as _};
 use crate::{gpus, interrupt, output, outputs, shell};
 use anyhow::Context;
 use sapwise::algorithm::usable_cores;

@@ -85,12 +85,6 @@ impl Profile {
         &self.algorithms[usize::from(position)].id
     }
 
-    /// Returns the medians of a point, in ns.
-    #[cfg(test)]
-    pub fn medians<'a>(&'a self, spot: &'a Spot) -> impl Iterator<Item = (&'a AlgorithmId, f64)> {
-        spot.medians.iter().map(|&(k, ns)| (self.id(k), ns))
-    }
-
     /// Returns these algorithms with the revisions that were timed, 0 for one that was not, to ask a model for them.
     pub fn with_revisions(&self, ids: &[AlgorithmId]) -> Vec<Entry> {
         let revision = |id: &AlgorithmId| self.algorithms.iter().find(|t| t.id == *id).map_or(0, |t| t.revision);

@@ -106,7 +106,8 @@ mod tests {
             let mut regret = 0.0;
             for spot in &profile.points {
                 let chosen = &tuning.costs[tuning.cheapest(&spot.load, |_| true).unwrap().0].algorithm;
-                let ns = profile.medians(spot).find(|m| m.0 == chosen).expect("chose one that had left the race").1;
+                let ns = profile.position(chosen).and_then(|k| spot.of_position(k));
+                let ns = ns.expect("chose one that had left the race");
                 regret += ns / spot.best().unwrap() - 1.0;
             }
             regret /= profile.points.len() as f64;

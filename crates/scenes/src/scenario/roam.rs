@@ -87,21 +87,28 @@ fn lattice(k: usize, side: usize, pitch: f32) -> [f32; 3] {
 }
 
 impl Roam {
-    fn new(objects: usize, kinds: Vec<Kind>) -> Self {
-        Self {
+    /// Places each object somewhere between the walls about its home. `place` returns the kind and the home of each in
+    /// turn.
+    fn placed(
+        objects: usize,
+        kinds: Vec<Kind>,
+        rng: &mut Rng,
+        mut place: impl FnMut(usize, &mut Rng) -> (usize, [f32; 3]),
+    ) -> Self {
+        let mut roam = Self {
             kinds,
             kind_of: Vec::with_capacity(objects),
             homes: Vec::with_capacity(objects),
             offsets: Vec::with_capacity(objects),
             jumps: false,
+        };
+        for k in 0..objects {
+            let (kind, home) = place(k, rng);
+            roam.kind_of.push(kind as u8);
+            roam.homes.push(home);
+            roam.offsets.push(roam.kinds[kind].anywhere(rng));
         }
-    }
-
-    /// Adds an object somewhere between the walls about its home.
-    fn add(&mut self, kind: usize, home: [f32; 3], rng: &mut Rng) {
-        self.kind_of.push(kind as u8);
-        self.homes.push(home);
-        self.offsets.push(self.kinds[kind].anywhere(rng));
+        roam
     }
 
     /// Shuffles the objects, so that neighbours in the list are no neighbours in space.
@@ -118,33 +125,27 @@ impl Roam {
     /// One object in fifty stands ten thousand worlds away on each axis, on a lattice.
     pub(super) fn parked(objects: usize, rng: &mut Rng) -> Self {
         let wall = wall(objects);
-        let mut roam = Self::new(objects, vec![Kind::cubes([wall; 3]), Kind::fixed([HALF; 3])]);
+        let kinds = vec![Kind::cubes([wall; 3]), Kind::fixed([HALF; 3])];
         let side = cube_root((objects / 50 + 1) as f64).ceil() as usize;
         let far = 10_000.0 * 2.0 * wall;
         let (mut scattered, mut parked) = (Scattered::one_in(50), 0);
-        for k in 0..objects {
-            if scattered.is(k, rng) {
-                roam.add(1, lattice(parked, side, 4.0).map(|at| far + at), rng);
-                parked += 1;
-            } else {
-                roam.add(0, [0.0; 3], rng);
+        Self::placed(objects, kinds, rng, |k, rng| {
+            if !scattered.is(k, rng) {
+                return (0, [0.0; 3]);
             }
-        }
-        roam
+            parked += 1;
+            (1, lattice(parked - 1, side, 4.0).map(|at| far + at))
+        })
     }
 
     /// Half of the objects in each of two worlds, a thousand of their edges apart.
     pub(super) fn stations(objects: usize, rng: &mut Rng) -> Self {
         let wall = wall(objects.div_ceil(2));
-        let mut roam = Self::new(objects, vec![Kind::cubes([wall; 3])]);
         // Half of 1000 edges of 2 walls, along the diagonal of a cube.
         let away = 1000.0 * wall / 3.0_f32.sqrt();
         let mut scattered = Scattered::one_in(2);
-        for k in 0..objects {
-            let home = if scattered.is(k, rng) { away } else { -away };
-            roam.add(0, [home; 3], rng);
-        }
-        roam
+        let place = |k: usize, rng: &mut Rng| (0, [if scattered.is(k, rng) { away } else { -away }; 3]);
+        Self::placed(objects, vec![Kind::cubes([wall; 3])], rng, place)
     }
 
     /// Floors of n^(1/4) by n^(1/4) flat objects, each in a field of its own.
@@ -154,14 +155,12 @@ impl Roam {
         let half = [HALF, HALF, 0.5 * thickness];
         // Fields are 1.25 wide and floors 0.25 apart: a twentieth stays free at least on x and y, a fiftieth on z.
         let flat = Kind { half, walls: [0.1, 0.1, 0.065], step: STEP * thickness };
-        let mut roam = Self::new(objects, vec![flat]);
         let floors = objects.div_ceil(side * side);
-        for k in 0..objects {
+        let place = |k: usize, _: &mut Rng| {
             let [x, y, floor] = [k % side, k / side % side, k / side / side];
-            let home = [(x as f32) * 1.25, (y as f32) * 1.25, (floor as f32 - floors as f32 * 0.5) * 0.25];
-            roam.add(0, home, rng);
-        }
-        roam.shuffled(rng)
+            (0, [(x as f32) * 1.25, (y as f32) * 1.25, (floor as f32 - floors as f32 * 0.5) * 0.25])
+        };
+        Self::placed(objects, vec![flat], rng, place).shuffled(rng)
     }
 
     /// Up to eight packs of plates as wide as the world, one object in 33, and cubes in the storeys between the
@@ -178,20 +177,16 @@ impl Roam {
         let cubes = Kind::cubes([wall, wall, (0.5 * storey - HALF + 0.1).max(0.0)]);
         let plate =
             Kind { half: [wall + 1.0, wall + 1.0, 0.25 * pitch], walls: [0.125 * pitch; 3], step: STEP * 0.5 * pitch };
-        let mut roam = Self::new(objects, vec![cubes, plate]);
         let bottom = |level: usize| (2.0 * level as f32 - packs as f32) * storey;
         let (mut scattered, mut placed) = (Scattered::one_in(33), 0);
-        for k in 0..objects {
-            if scattered.is(k, rng) {
-                let at = (placed % in_pack) as f32 + 0.5;
-                roam.add(1, [0.0, 0.0, bottom(placed / in_pack) + storey + at * pitch], rng);
-                placed += 1;
-            } else {
-                let level = rng.below(packs);
-                roam.add(0, [0.0, 0.0, bottom(level) + 0.5 * storey], rng);
+        Self::placed(objects, vec![cubes, plate], rng, |k, rng| {
+            if !scattered.is(k, rng) {
+                return (0, [0.0, 0.0, bottom(rng.below(packs)) + 0.5 * storey]);
             }
-        }
-        roam
+            let (pack, at) = (placed / in_pack, (placed % in_pack) as f32 + 0.5);
+            placed += 1;
+            (1, [0.0, 0.0, bottom(pack) + storey + at * pitch])
+        })
     }
 
     /// One object in ten is a rod along a random axis.
@@ -201,13 +196,9 @@ impl Roam {
         let wall = (cube_root(212.0 * objects as f64) * 0.5) as f32;
         let mut kinds = vec![Kind::cubes([wall; 3]); 4];
         (0..3).for_each(|axis| kinds[axis].half[axis] = 15.0);
-        let mut roam = Self::new(objects, kinds);
         let mut scattered = Scattered::one_in(10);
-        for k in 0..objects {
-            let kind = if scattered.is(k, rng) { rng.below(3) } else { 3 };
-            roam.add(kind, [0.0; 3], rng);
-        }
-        roam
+        let place = |k: usize, rng: &mut Rng| (if scattered.is(k, rng) { rng.below(3) } else { 3 }, [0.0; 3]);
+        Self::placed(objects, kinds, rng, place)
     }
 
     /// A hilly ground of fixed boxes that overlap their 24 neighbours, and one object in twenty that moves above and
@@ -215,68 +206,55 @@ impl Roam {
     pub(super) fn static_world(objects: usize, rng: &mut Rng) -> Self {
         let side = (objects as f64).sqrt().ceil() as usize;
         let wall = side as f32 * 0.5;
-        let mut roam = Self::new(objects, vec![Kind::fixed([1.1, 1.1, 1.0]), Kind::cubes([wall, wall, 5.0])]);
+        let kinds = vec![Kind::fixed([1.1, 1.1, 1.0]), Kind::cubes([wall, wall, 5.0])];
         // Up and down by 2 within 20 edges: neighbours differ by at most 0.4, less than a box is high.
         let hill = |at: usize| (at % 20).abs_diff(10) as f32 * 0.2 - 1.0;
         let mut scattered = Scattered::one_in(20);
-        for k in 0..objects {
-            if scattered.is(k, rng) {
-                roam.add(1, [0.0, 0.0, 5.0], rng);
-            } else {
-                let (x, y) = (k % side, k / side);
-                roam.add(0, [x as f32 - wall, y as f32 - wall, hill(x) + hill(y)], rng);
-            }
-        }
-        roam.shuffled(rng)
+        let place = |k: usize, rng: &mut Rng| {
+            let (x, y) = (k % side, k / side);
+            let ground = [x as f32 - wall, y as f32 - wall, hill(x) + hill(y)];
+            if scattered.is(k, rng) { (1, [0.0, 0.0, 5.0]) } else { (0, ground) }
+        };
+        Self::placed(objects, kinds, rng, place).shuffled(rng)
     }
 
     /// One object in fifty lies four million edges below the others and stays there.
     pub(super) fn asleep(objects: usize, rng: &mut Rng) -> Self {
         let wall = wall(objects);
-        let mut roam = Self::new(objects, vec![Kind::cubes([wall; 3]), Kind::fixed([HALF; 3])]);
+        let cubes = Kind::cubes([wall; 3]);
         let mut scattered = Scattered::one_in(50);
-        for k in 0..objects {
-            if scattered.is(k, rng) {
-                let [x, y, z] = Kind::cubes([wall; 3]).anywhere(rng);
-                roam.add(1, [x, y - 4.0e6, z], rng);
-            } else {
-                roam.add(0, [0.0; 3], rng);
+        Self::placed(objects, vec![cubes, Kind::fixed([HALF; 3])], rng, |k, rng| {
+            if !scattered.is(k, rng) {
+                return (0, [0.0; 3]);
             }
-        }
-        roam
+            let [x, y, z] = cubes.anywhere(rng);
+            (1, [x, y - 4.0e6, z])
+        })
     }
 
     /// Unit cubes on one line, each overlapping those above and below it.
     pub(super) fn tower(objects: usize, rng: &mut Rng) -> Self {
-        let mut roam = Self::new(objects, vec![Kind::cubes([0.1; 3])]);
-        for k in 0..objects {
-            roam.add(0, [0.0, 0.0, (k as f32 - objects as f32 * 0.5) * 0.75], rng);
-        }
-        roam.shuffled(rng)
+        let place = |k: usize, _: &mut Rng| (0, [0.0, 0.0, (k as f32 - objects as f32 * 0.5) * 0.75]);
+        Self::placed(objects, vec![Kind::cubes([0.1; 3])], rng, place).shuffled(rng)
     }
 
     /// Boxes far apart in the middle of each of 256 equal parts of the list, where an evenly spaced sample looks.
     pub(super) fn aliased(objects: usize, rng: &mut Rng) -> Self {
         let wall = wall(objects);
-        let mut roam = Self::new(objects, vec![Kind::cubes([wall; 3])]);
         // A power of two: for 2^17 objects the special ones have the indices 256 modulo 512.
         let parts = 1 << (objects as u64 / 32).max(1).ilog2().min(8);
         let mut part = 0;
-        for k in 0..objects as u64 {
-            let special = (2 * part + 1) * objects as u64 / (2 * parts) == k;
+        Self::placed(objects, vec![Kind::cubes([wall; 3])], rng, |k, rng| {
+            let special = (2 * part + 1) * objects as u64 / (2 * parts) == k as u64;
             part += u64::from(special);
-            let home = if special { rng.signed3().map(|u| u * 1000.0 * wall) } else { [0.0; 3] };
-            roam.add(0, home, rng);
-        }
-        roam
+            (0, if special { rng.signed3().map(|u| u * 1000.0 * wall) } else { [0.0; 3] })
+        })
     }
 
     /// Unit cubes that walk and now and then all jump to new places.
     pub(super) fn teleport(objects: usize, rng: &mut Rng) -> Self {
-        let mut roam = Self::new(objects, vec![Kind::cubes([wall(objects); 3])]);
-        (0..objects).for_each(|_| roam.add(0, [0.0; 3], rng));
-        roam.jumps = true;
-        roam
+        let walking = Self::placed(objects, vec![Kind::cubes([wall(objects); 3])], rng, |_, _| (0, [0.0; 3]));
+        Self { jumps: true, ..walking }
     }
 
     /// Sheets as wide as the world at random heights.
@@ -289,9 +267,7 @@ impl Roam {
             walls: [0.0, 0.0, wall],
             step: 0.25 * gap,
         };
-        let mut roam = Self::new(objects, vec![sheet(0.0), sheet(0.2)]);
-        (0..objects).for_each(|k| roam.add(k % 2, [0.0; 3], rng));
-        roam
+        Self::placed(objects, vec![sheet(0.0), sheet(0.2)], rng, |k, _| (k % 2, [0.0; 3]))
     }
 
     /// Rods as long as the world, each along a random axis.
@@ -304,12 +280,7 @@ impl Roam {
             let of = |own: f32, other: f32| [0, 1, 2].map(|axis| if axis == along { own } else { other });
             Kind { half: of(wall, half), walls: of(0.0, wall), step: 0.5 * half }
         };
-        let mut roam = Self::new(objects, [0, 1, 2].map(rod).to_vec());
-        for _ in 0..objects {
-            let along = rng.below(3);
-            roam.add(along, [0.0; 3], rng);
-        }
-        roam
+        Self::placed(objects, [0, 1, 2].map(rod).into(), rng, |_, rng| (rng.below(3), [0.0; 3]))
     }
 
     /// One object in ten has the bounds of a beam in a random direction.
@@ -326,13 +297,9 @@ impl Roam {
         };
         let mut kinds: Vec<Kind> = (0..BEAMS).map(beam).collect();
         kinds.push(Kind::cubes([wall; 3]));
-        let mut roam = Self::new(objects, kinds);
         let mut scattered = Scattered::one_in(10);
-        for k in 0..objects {
-            let kind = if scattered.is(k, rng) { rng.below(BEAMS) } else { BEAMS };
-            roam.add(kind, [0.0; 3], rng);
-        }
-        roam
+        let place = |k: usize, rng: &mut Rng| (if scattered.is(k, rng) { rng.below(BEAMS) } else { BEAMS }, [0.0; 3]);
+        Self::placed(objects, kinds, rng, place)
     }
 
     /// Fixed buildings on a lattice, and up to 2000 objects that move between and in them.
@@ -346,15 +313,16 @@ impl Roam {
         };
         let mut kinds: Vec<Kind> = (0..BUILDINGS).map(building).collect();
         kinds.push(Kind::cubes([wall, wall, 10.0]));
-        let mut roam = Self::new(objects, kinds);
-        for k in 0..objects - movers {
+        let heights: Vec<f32> = kinds.iter().map(|kind| kind.half[2]).collect();
+        let place = |k: usize, rng: &mut Rng| {
+            if k >= objects - movers {
+                return (BUILDINGS, [0.0, 0.0, 10.0]);
+            }
             let kind = rng.below(BUILDINGS);
             let [x, y] = [k % side, k / side].map(|at| 2.0 * at as f32 - wall);
-            let height = roam.kinds[kind].half[2];
-            roam.add(kind, [x, y, height], rng);
-        }
-        (0..movers).for_each(|_| roam.add(BUILDINGS, [0.0, 0.0, 10.0], rng));
-        roam.shuffled(rng)
+            (kind, [x, y, heights[kind]])
+        };
+        Self::placed(objects, kinds, rng, place).shuffled(rng)
     }
 
     /// Writes the boxes of all objects.

@@ -63,12 +63,6 @@ macro_rules! parameters {
             }
         }
 
-        impl From<$name> for String {
-            fn from(id: $name) -> Self {
-                id.as_str().to_owned()
-            }
-        }
-
         impl PartialEq<$name> for String {
             fn eq(&self, other: &$name) -> bool {
                 self == other.as_str()

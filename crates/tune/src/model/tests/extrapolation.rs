@@ -13,7 +13,7 @@ fn both() -> Model {
         (ParameterId::UsableCores, 2.0, 64.0),
         (ParameterId::BandwidthOneThreadGbPerS, 8.0, 50.0),
     ];
-    model.ranges = ranges.map(|(id, min, max)| Range { parameter: id.into(), min, max }).to_vec();
+    model.ranges = ranges.map(|(id, min, max)| Range { parameter: id.to_string(), min, max }).to_vec();
     model
 }
 
