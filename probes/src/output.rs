@@ -40,12 +40,8 @@ pub(crate) fn print_json(value: &impl Serialize) -> anyhow::Result<()> {
 /// # Errors
 /// As [`print()`].
 pub(crate) fn answer(json: bool, answer: &impl Serialize, text: impl FnOnce() -> String) -> anyhow::Result<Outcome> {
-    if json {
-        print_json(answer)?
-    } else {
-        print(&text())?
-    }
-    Ok(Outcome::Done)
+    let printed = if json { print_json(answer) } else { print(&text()) };
+    printed.map(|()| Outcome::Done)
 }
 
 /// Writes the JSON text of a file as one line to standard output.
