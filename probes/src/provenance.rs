@@ -119,18 +119,8 @@ pub(crate) fn command(arguments: &Probe) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::args::{Arguments, Verb};
-    use clap::Parser;
     use sapwise_lab::report::Timing;
     use sapwise_tune::{GpuHardware, GpuIdentity, Machine};
-
-    fn probe(words: &[&str]) -> Probe {
-        let all = ["sapwise", "probe"].iter().chain(words);
-        match Arguments::try_parse_from(all).unwrap().verb {
-            Verb::Probe(probe) => probe,
-            other => panic!("{other:?}"),
-        }
-    }
 
     fn point(foreign_load: Option<f64>) -> Point {
         Point { scenario: "uniform".to_owned(), foreign_load, ..Point::default() }
@@ -138,17 +128,25 @@ mod tests {
 
     #[test]
     fn the_command_holds_no_path() {
-        let arguments =
-            probe(&["--quick", "--out", "/home/someone/r.json", "--threads", "1", "--scenario", "slab", "--no-gpus"]);
+        let arguments = Probe::of(&[
+            "--quick",
+            "--out",
+            "/home/someone/r.json",
+            "--threads",
+            "1",
+            "--scenario",
+            "slab",
+            "--no-gpus",
+        ]);
         assert_eq!(command(&arguments), "probe --quick --no-gpus --threads 1 --seed 1 --scenario slab");
-        assert_eq!(command(&probe(&["--gpu", "0", "--gpu", "2"])), "probe --gpu 0 --gpu 2 --seed 1");
+        assert_eq!(command(&Probe::of(&["--gpu", "0", "--gpu", "2"])), "probe --gpu 0 --gpu 2 --seed 1");
     }
 
     #[test]
     fn contention_and_restriction_are_labelled() {
         let quiet = [point(Some(0.01)), point(None), point(Some(0.9)), point(Some(0.0))];
         let busy = [point(Some(0.3)), point(Some(0.4)), point(Some(0.0))];
-        let label = |words: &[&str], points: &[Point]| label(&probe(words), points, &hardware(GpuKind::Discrete));
+        let label = |words: &[&str], points: &[Point]| label(&Probe::of(words), points, &hardware(GpuKind::Discrete));
         assert_eq!(label(&[], &busy), Label::RealContended);
         if requested_level().is_none() {
             assert_eq!(label(&[], &quiet), Label::RealFull);
@@ -170,9 +168,9 @@ mod tests {
         let swept = [Point { timings: vec![timing(vec![1, 2, 3])], ..point(None) }];
         let failed = [Point { timings: vec![timing(Vec::new())], ..point(None) }];
         let software = hardware(GpuKind::Software);
-        assert_eq!(label(&probe(&[]), &swept, &software), Label::RealSoftwareGpu);
-        assert_ne!(label(&probe(&[]), &failed, &software), Label::RealSoftwareGpu);
-        assert_ne!(label(&probe(&[]), &swept, &hardware(GpuKind::Discrete)), Label::RealSoftwareGpu);
+        assert_eq!(label(&Probe::of(&[]), &swept, &software), Label::RealSoftwareGpu);
+        assert_ne!(label(&Probe::of(&[]), &failed, &software), Label::RealSoftwareGpu);
+        assert_ne!(label(&Probe::of(&[]), &swept, &hardware(GpuKind::Discrete)), Label::RealSoftwareGpu);
         assert_eq!(timed(&swept, Some(1), &software, &Algorithms::default())[0].id.to_string(), "brute@gpu0");
     }
 }

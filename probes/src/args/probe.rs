@@ -65,4 +65,13 @@ impl Probe {
     pub(crate) fn scenarios(&self) -> Vec<Scenario> {
         once(self.scenarios.iter().copied())
     }
+    /// The arguments after `sapwise probe`.
+    #[cfg(test)]
+    pub(crate) fn of(words: &[&str]) -> Self {
+        let all = ["sapwise", "probe"].iter().chain(words);
+        match <super::Arguments as clap::Parser>::try_parse_from(all).unwrap().verb {
+            super::Verb::Probe(probe) => probe,
+            other => panic!("{other:?}"),
+        }
+    }
 }

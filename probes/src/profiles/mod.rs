@@ -162,13 +162,10 @@ impl Folder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::args::{Arguments, Verb};
-    use clap::Parser;
     use sapwise_lab::report::{Label, Report};
 
     fn full(words: &[&str]) -> Profile {
-        let words = ["sapwise", "probe", "--profiles", "--no-gpus"].iter().chain(words);
-        let Verb::Probe(probe) = Arguments::try_parse_from(words).unwrap().verb else { panic!("another verb") };
+        let probe = Probe::of(&[&["--profiles", "--no-gpus"], words].concat());
         profiles(&probe, 1, SimdLevel::Portable, &[]).swap_remove(0)
     }
 

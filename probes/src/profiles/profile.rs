@@ -101,13 +101,9 @@ fn profile(probe: &Probe, prefix: &str, (threads, simd): Limits, gpus: &[GpuIden
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::args::{Arguments, Verb};
-    use clap::Parser;
 
     fn all(cores: u32, level: SimdLevel, gpus: &[GpuIdentity]) -> Vec<Profile> {
-        let words = ["sapwise", "probe", "--profiles", "--seed=3"];
-        let Verb::Probe(probe) = Arguments::try_parse_from(words).unwrap().verb else { panic!("another verb") };
-        profiles(&probe, cores, level, gpus)
+        profiles(&Probe::of(&["--profiles", "--seed=3"]), cores, level, gpus)
     }
 
     fn gpu(index: u32, name: &str, kind: GpuKind) -> GpuIdentity {
@@ -136,6 +132,6 @@ mod tests {
         assert_eq!(all[1].command, "probe --no-gpus --threads 1 --seed 3");
         assert_eq!(all[7].command, "probe --quick --gpu 2 --gpu 3 --seed 3");
         assert_eq!(all[9].command, all[1].command);
-        assert!(Arguments::try_parse_from(format!("sapwise {}", all[7].command).split(' ')).is_ok());
+        Probe::of(&all[7].command.split(' ').skip(1).collect::<Vec<_>>());
     }
 }

@@ -195,16 +195,11 @@ impl Fitted<'_> {
 /// Chooses the cheapest by costs, or nothing, which counts as the worst, without any.
 fn by<'a>(name: &'static str, costs: Option<&'a [AlgorithmCost]>, available: &'a [AlgorithmId]) -> Contestant<'a> {
     let costs = costs.unwrap_or_default();
-    let choose = if costs.is_empty() { nothing() } else { by_costs(costs.to_vec(), available) };
+    let choose: Strategy<'_> = if costs.is_empty() { Box::new(|_| None) } else { by_costs(costs.to_vec(), available) };
     Contestant { name, choose, costs: Some(costs) }
 }
 
 /// A strategy that predicts no costs.
 fn alone<'a>(name: &'static str, choose: Strategy<'a>) -> Contestant<'a> {
     Contestant { name, choose, costs: None }
-}
-
-/// Chooses nothing, which counts as the worst.
-fn nothing<'a>() -> Strategy<'a> {
-    Box::new(|_| None)
 }
