@@ -209,7 +209,7 @@ mod tests {
         let frames = |every: u32, work: f32| {
             let mut prices = keeping(1, 0);
             let pays = |k: &u32| {
-                let (took, work) = if k % every == 0 { (5000.0, work) } else { (40.0, 30.0) };
+                let (took, work) = if k.is_multiple_of(every) { (5000.0, work) } else { (40.0, 30.0) };
                 prices.pays(Some(took), work, 40.0)
             };
             (0..1000).take_while(pays).count()
