@@ -49,10 +49,10 @@ miri() {
 
 valgrind() {
     [ -x "$(type -P valgrind)" ] || { apt-get update -q; apt-get install -qy --no-install-recommends valgrind; }
-    # The packages of `.ci/run`: with fewer, cargo builds the library again with other features.
+    # All default packages: with fewer, cargo builds the library again with other features.
     local runner=CARGO_TARGET_${host//-/_}_RUNNER
     env "${runner^^}=valgrind --quiet --error-exitcode=9" \
-        cargo test --locked --quiet --workspace --exclude sapwise-bench --test small --test threads --test measure
+        cargo test --locked --quiet --test small --test threads --test measure
 }
 
 parts=("$@")

@@ -90,9 +90,8 @@ tools=${CARGO_TARGET_DIR:-target}/tools
 CARGO_TARGET_DIR=$tools cargo build --quiet --locked --manifest-path tools/shaders/Cargo.toml
 shaders=$tools/debug/sapwise-shaders
 mkdir "$work"/{wgsl,out,wrong,heavy}
-# As in `.ci/run`: with fewer packages, cargo builds dependencies again with other features.
-tests=(cargo test --locked --workspace --exclude sapwise-bench)
-SAPWISE_SHADERS=$work/wgsl "${tests[@]}" --quiet --lib -- every_shader_is_valid >"$work/said" 2>&1 \
+# All default packages, as in `cargo test`: with fewer, cargo builds dependencies again with other features.
+SAPWISE_SHADERS=$work/wgsl cargo test --quiet --locked --lib -- every_shader_is_valid >"$work/said" 2>&1 \
     || { cat "$work/said" >&2; fail "no kernels"; }
 git ls-files '*.wgsl' | while read -r file; do
     grep -qFx -- "$(head -n 1 "$file")" "$work"/wgsl/*.wgsl \
@@ -196,14 +195,14 @@ watched "$shaders" hazard
 for rule in VUID-vkCmdFillBuffer-dstBuffer-00029 SYNC-HAZARD-WRITE-AFTER-WRITE; do
     messages | grep -F "$rule" >/dev/null || fail "the validation layers don't report $rule"
 done
-# The program of these tests: with `-p sapwise-gpu` cargo builds wgpu again with other features.
-of_gpu=$("${tests[@]}" --no-run --lib 2>&1 | sed -n 's/.*(\(.*sapwise_gpu-[^)]*\))$/\1/p')
+# The program of `cargo test`: with `-p sapwise-gpu` cargo builds wgpu again with other features.
+of_gpu=$(cargo test --locked --no-run --lib 2>&1 | sed -n 's/.*(\(.*sapwise_gpu-[^)]*\))$/\1/p')
 [ -x "$of_gpu" ] || fail "cargo names no program of the tests of sapwise-gpu"
 # All methods, the measurements, pieces and windows. Tests that repeat the same calls at other sizes take minutes.
-for some in "" "--test gpu_device" "--test gpu_resident" "--test measure_gpu" \
+for tests in "" "--test gpu_device" "--test gpu_resident" "--test measure_gpu" \
     "--test gpu_contract random_boxes" "--test gpu_faults come_in_"; do
     # shellcheck disable=SC2086 # Words of cargo's.
-    if [ -n "$some" ]; then watched "${tests[@]}" --quiet $some; else watched "$of_gpu"; fi
-    if messages >&2; then fail "the validation layers report errors in ${some:-the tests of the library}"; fi
+    if [ -n "$tests" ]; then watched cargo test --quiet --locked $tests; else watched "$of_gpu"; fi
+    if messages >&2; then fail "the validation layers report errors in ${tests:-the tests of the library}"; fi
 done
 step "all is well"

@@ -69,8 +69,8 @@ packed=$out/$(cd "$out/npm" && npm pack --silent --pack-destination "$out")
 rm -rf "$out/three"
 cp -r bindings/web/examples/three "$out/three"
 (cd "$out/three" && npm install --no-audit --no-fund --silent "$packed" && npm test --silent)
-# With the packages of `.ci/run`, whose tests have built the command: `cargo run` would build it with other features.
-usual test --quiet --no-run --locked --workspace --exclude sapwise-bench --test cli
+# As in `cargo test`, which builds the command, too: `cargo run` would build it with other features.
+usual test --quiet --no-run --locked --test cli
 "$out/debug/sapwise" check "$SAPWISE_REPORT"
 if [ "$what" = browser ]; then
     SAPWISE=$out/debug/sapwise node bindings/web/tests/browser/run.mjs "$out/web"
