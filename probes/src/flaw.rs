@@ -14,7 +14,7 @@ pub(crate) fn flaw(report: &Report, registry: &Registry) -> Option<String> {
         return Some(format!("it is stale: {stale}"));
     }
     let hardware_only = provenance.command.split(' ').any(|word| word == "--hardware-only");
-    if report.points.is_empty() && !hardware_only || report.is_unfinished() {
+    if report.points.is_empty() && !hardware_only || report.has_gaps() {
         return Some("it is incomplete".to_owned());
     }
     (report.label == Label::RealContended).then(|| "other programs disturbed it".to_owned())

@@ -43,13 +43,16 @@ impl Kind {
     }
 }
 
-/// Returns why a report can't stand for the machines of its kind: it is published, was cut short or was disturbed.
+/// Returns why a report can't stand for the machines of its kind: it is published, was cut short, has
+/// gaps or was disturbed.
 #[must_use]
 pub fn unusable(report: &Report) -> Option<&'static str> {
     if report.label == Label::Published {
         Some("it holds published parameters")
     } else if report.is_unfinished() {
         Some("it was cut short")
+    } else if report.has_gaps() {
+        Some("it has gaps or wrong answers")
     } else if report.label == Label::RealContended {
         Some("other programs disturbed it")
     } else {

@@ -199,7 +199,9 @@ mod tests {
         assert_eq!(lack(&[], &|_| ()), Ok(None));
         let disturbed = lack(&[], &|r| r.label = Label::RealContended);
         assert_eq!(disturbed, Ok(Some("other programs disturbed it".to_owned())));
-        assert!(lack(&[], &|r| r.remarks.push("interrupted".to_owned())).unwrap().is_some());
+        for remark in ["interrupted", "clustered is incomplete: its process crashed", "WRONG ANSWER: sap@cpu1"] {
+            assert!(lack(&[], &|r| r.remarks.push(remark.to_owned())).unwrap().is_some(), "{remark}");
+        }
         assert!(lack(&["--seed=2"], &|_| ()).unwrap_err().contains("another command"));
         assert!(
             lack(&[], &|r| r.hardware.machine.physical_id = "1".repeat(16)).unwrap_err().contains("another machine")

@@ -6,7 +6,7 @@ use crate::child::{Ended, run_part};
 use crate::interrupt;
 use crate::progress::{Progress, Steps as _};
 use anyhow::Context;
-use sapwise_lab::report::Point;
+use sapwise_lab::report::{Point, Report};
 use sapwise_lab::sweep::Plan;
 use sapwise_scenes::Random;
 use sapwise_tune::GpuIdentity;
@@ -100,7 +100,7 @@ impl Sweep<'_> {
                 return Ok(false);
             }
             Ended::Badly(how) => {
-                self.found.remarks.push(format!("{scenario} is incomplete: its process {how}"));
+                self.found.remarks.push(format!("{scenario}{}{how}", Report::INCOMPLETE));
                 self.found.failed = true;
                 // A driver is the most likely cause.
                 if !self.gpus.is_empty() {
@@ -143,8 +143,9 @@ impl Sweep<'_> {
                 }
                 Event::Remark(text) => found.remarks.push(text),
                 Event::Mismatch(text) => {
-                    crate::output::complain(&format!("WRONG ANSWER: {text}"));
-                    found.remarks.push(format!("WRONG ANSWER: {text}"));
+                    let text = format!("{}{text}", Report::WRONG_ANSWER);
+                    crate::output::complain(&text);
+                    found.remarks.push(text);
                     found.failed = true;
                 }
             }

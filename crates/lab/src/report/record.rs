@@ -198,6 +198,18 @@ impl Report {
         self.remarks.iter().any(|remark| Self::is_cut_short(remark))
     }
 
+    /// Begins the remark about an algorithm that found other pairs than the rest.
+    pub const WRONG_ANSWER: &str = "WRONG ANSWER: ";
+    /// Stands between a scenario and what became of its process in the remark about points that are missing.
+    pub const INCOMPLETE: &str = " is incomplete: its process ";
+
+    /// Returns whether the measurement has gaps or wrong answers, as the remarks say.
+    #[must_use]
+    pub fn has_gaps(&self) -> bool {
+        let gap = |remark: &String| remark.starts_with(Self::WRONG_ANSWER) || remark.contains(Self::INCOMPLETE);
+        self.is_unfinished() || self.remarks.iter().any(gap)
+    }
+
     /// Returns whether a remark says that the measurement was cut short.
     #[must_use]
     pub fn is_cut_short(remark: &str) -> bool {
