@@ -70,11 +70,11 @@ impl Machine {
     /// `478e43ba2e7824ab-avx512-16-10de2335.json`. Software adapters are left out.
     #[must_use]
     pub fn tuning_file(&self, cores: u32, gpus: &[GpuIdentity]) -> String {
-        let mut name = format!("{}-{}-{cores}", self.physical_id, self.simd);
+        // A driver's text and a report of a stranger may hold any character.
+        let plain = |text: &str| text.chars().filter(char::is_ascii_alphanumeric).collect::<String>();
+        let mut name = format!("{}-{}-{cores}", plain(&self.physical_id), plain(&self.simd));
         for gpu in gpus.iter().filter(|gpu| gpu.kind != GpuKind::Software) {
-            name.push('-');
-            // A driver's text may hold any character.
-            name.extend(gpu.device.chars().filter(char::is_ascii_alphanumeric));
+            name = name + "-" + &plain(&gpu.device);
         }
         name + ".json"
     }
