@@ -19,7 +19,6 @@ pub(crate) fn check(inputs: &[PathBuf], outputs: &[&PathBuf]) -> anyhow::Result<
 /// # Errors
 /// [`WrongUsage`] that names the file.
 pub(crate) fn refuse_overwriting(inputs: &[PathBuf], outputs: &[&PathBuf]) -> Result<(), WrongUsage> {
-    let place = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let read: Vec<PathBuf> = inputs.iter().map(|path| place(path)).collect();
     for (k, path) in outputs.iter().enumerate() {
         let own = place(path);
@@ -31,6 +30,16 @@ pub(crate) fn refuse_overwriting(inputs: &[PathBuf], outputs: &[&PathBuf]) -> Re
         }
     }
     Ok(())
+}
+
+/// Returns the place of a file or folder by links and dots that exist, whether it exists or not.
+pub(crate) fn place(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| match (path.parent(), path.file_name()) {
+        (Some(folder), Some(name)) => {
+            place(if folder.as_os_str().is_empty() { Path::new(".") } else { folder }).join(name)
+        }
+        _ => path.to_owned(),
+    })
 }
 
 /// Tries whether a file can be written, by a temporary file in its folder, which is created if it is missing. A device

@@ -84,4 +84,5 @@ fn each_kind_of_machine_gets_a_tuning_by_its_identity() {
     assert_eq!(tuning.source, sapwise::tuning::Source::Measured);
     failure(&mut predict(&[]), 2, &["--out"]);
     failure(predict(&["--out"]).arg(reports.path()), 2, &["holds the reports"]);
+    failure(predict(&["--out"]).arg(reports.path().join("new/tunings")), 2, &["holds the reports"]);
 }

@@ -26,8 +26,9 @@ pub(super) fn run(folder: &Path, arguments: &Predict, algorithms: &Algorithms) -
         );
         return Err(WrongUsage(why).into());
     };
-    if out.canonicalize().is_ok_and(|out| folder.canonicalize().is_ok_and(|folder| folder == out)) {
-        let why = format!("{} holds the reports; name another folder for the tunings", out.display());
+    // The next call would take the tunings for reports.
+    if outputs::place(out).starts_with(outputs::place(folder)) {
+        let why = format!("{} holds the reports; name a folder elsewhere for the tunings", folder.display());
         return Err(WrongUsage(why).into());
     }
     let model = prediction::model(arguments.model.as_deref())?.model;
