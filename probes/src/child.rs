@@ -98,6 +98,7 @@ fn run(
     let complaints = child.0.stderr.take().map(last_line);
     let lines = child.0.stdout.take().map(lines);
     let end = Instant::now() + limit;
+    let too_long = || Ended::Badly(format!("was stopped after {} s, which is too long", limit.as_secs()));
     while let Some(lines) = &lines {
         match lines.recv_timeout(POLL) {
             Ok(line) => on_line(&line)?,
@@ -113,10 +114,22 @@ fn run(
         }
         on_wait();
         if Instant::now() >= end {
-            return Ok(Ended::Badly(format!("was stopped after {} s, which is too long", limit.as_secs())));
+            return Ok(too_long());
         }
     }
-    let status = child.0.wait().context("a part of the measurement got lost")?;
+    // It closed its standard output, and may still hang.
+    let status = loop {
+        if let Some(status) = child.0.try_wait().context("a part of the measurement got lost")? {
+            break status;
+        }
+        if interrupt::requested() {
+            return Ok(Ended::Interrupted);
+        }
+        if Instant::now() >= end {
+            return Ok(too_long());
+        }
+        std::thread::sleep(POLL);
+    };
     let complaint = complaints.and_then(|c| c.join().ok()).unwrap_or_default();
     Ok(judge(status, &complaint))
 }
@@ -148,11 +161,17 @@ impl Drop for EndedOnDrop {
     }
 }
 
-/// Returns lines as they come. A line that is not text ends them, since nothing after it can be trusted.
+/// Returns the lines of a source. A driver may print what is not text.
+fn texts(source: impl Read) -> impl Iterator<Item = String> {
+    let lines = BufReader::new(source).split(b'\n').map_while(Result::ok);
+    lines.map(|line| String::from_utf8_lossy(&line).trim_end_matches('\r').to_owned())
+}
+
+/// Returns lines as they come.
 fn lines(source: impl Read + Send + 'static) -> Receiver<String> {
     let (sender, receiver) = channel();
     std::thread::spawn(move || {
-        for line in BufReader::new(source).lines().map_while(Result::ok) {
+        for line in texts(source) {
             if sender.send(line).is_err() {
                 return;
             }
@@ -163,9 +182,7 @@ fn lines(source: impl Read + Send + 'static) -> Receiver<String> {
 
 /// Returns the last line of standard error. Reads everything, because a full pipe would stop the part.
 fn last_line(source: impl Read + Send + 'static) -> JoinHandle<String> {
-    std::thread::spawn(move || {
-        BufReader::new(source).lines().map_while(Result::ok).filter(|l| !l.trim().is_empty()).last().unwrap_or_default()
-    })
+    std::thread::spawn(move || texts(source).filter(|l| !l.trim().is_empty()).last().unwrap_or_default())
 }
 
 fn judge(status: ExitStatus, complaint: &str) -> Ended {
