@@ -219,10 +219,10 @@ impl Engine {
         grown |= self.output.ensure_blocks(gpu, self.first_blocks(params.objects))?;
         // Most scenes have fewer pairs than boxes.
         let wanted = n.max(self.expected + self.expected / 4);
+        // If there is no memory for the pairs of the previous frame, there may be enough for those of this one.
         grown |= match self.home {
-            Home::Host => self.output.ensure_pairs(gpu, wanted)?,
-            // Commands of the program may still read the previous list. If there is no memory for the pairs of the
-            // previous frame, there may be enough for those of this one.
+            Home::Host => self.output.ensure_pairs(gpu, wanted).or_else(|_| self.output.ensure_pairs(gpu, n))?,
+            // Commands of the program may still read the previous list.
             Home::Device(_) => self.output.enlarge_pairs(gpu, wanted).or_else(|_| self.output.enlarge_pairs(gpu, n))?,
         };
         self.download.ensure(gpu, PAIRS_AT + self.sendable() * PAIR)?;

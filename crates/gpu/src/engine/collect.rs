@@ -32,7 +32,10 @@ impl Engine {
             }
             self.go_on(frame, &header, 0)?;
         }
-        self.expected = all;
+        // Pairs over the limit were not stored, and room for as many may not be had.
+        if !pairs.is_over() {
+            self.expected = all;
+        }
         Ok(())
     }
 
