@@ -45,7 +45,8 @@ impl Model {
 /// Writes a tuning, one key a line.
 ///
 /// # Errors
-/// [`Error::Write`] when a value is not finite.
+/// [`Error::Write`] when `serde_json` refuses a value. A number that is not finite becomes `null`, which no reader
+/// takes.
 pub fn write_tuning(tuning: &Tuning) -> Result<String, Error> {
     Format::TUNING.write(tuning)
 }
@@ -53,7 +54,8 @@ pub fn write_tuning(tuning: &Tuning) -> Result<String, Error> {
 /// Writes the predicting part of a model, one key a line.
 ///
 /// # Errors
-/// [`Error::Write`] when a value is not finite.
+/// [`Error::Write`] when `serde_json` refuses a value. A number that is not finite becomes `null`, which no reader
+/// takes.
 pub fn write_model(model: &Model) -> Result<String, Error> {
     Format::MODEL.write(model)
 }
@@ -61,7 +63,8 @@ pub fn write_model(model: &Model) -> Result<String, Error> {
 /// Writes a value without a schema, one key a line.
 ///
 /// # Errors
-/// [`Error::Write`] when a value is not finite.
+/// [`Error::Write`] when `serde_json` refuses a value. A number that is not finite becomes `null`, which no reader
+/// takes.
 pub fn write(value: &impl serde::Serialize) -> Result<String, Error> {
     Ok(serde_json::to_string_pretty(value).map_err(Error::Write)? + "\n")
 }

@@ -159,7 +159,7 @@ impl Format {
     /// Writes a file, one key a line, the schema first.
     ///
     /// # Errors
-    /// [`Error::Write`] when a value is not finite.
+    /// [`Error::Write`] when `serde_json` refuses a value.
     pub fn write<T: Serialize>(&self, value: &T) -> Result<String, Error> {
         let schema = format!("{{\n  \"schema\": \"{}\",", self.schema());
         Ok(super::write(value)?.replacen('{', &schema, 1))
