@@ -210,7 +210,8 @@ impl Run<'_> {
                 self.remove(count);
             }
             16..20 => self.update(),
-            20..24 => (0..self.source.below(16)).for_each(|_| self.update()),
+            20..23 => (0..self.source.below(16)).for_each(|_| self.update()),
+            23 => self.update_within_limit(),
             24 => self.spaces[1] = self.spaces[0].clone(),
             25 | 26 => self.spaces[1] = restored(&self.spaces[0]),
             27 => {
@@ -316,6 +317,29 @@ impl Run<'_> {
         self.both(|space| space.update()).unwrap();
         self.model.update();
         self.compare();
+    }
+
+    /// Removes some bodies and makes an update that fails if active bodies have more pairs, and if so some calls and
+    /// another update.
+    fn update_within_limit(&mut self) {
+        let (limit, count) = ([0, 3, 40][self.source.below(3)], self.source.below(3));
+        self.remove(count);
+        self.both(|space| space.set_limit(Some(limit)));
+        let found = self.both(|space| space.update());
+        self.both(|space| space.set_limit(None));
+        if found.is_ok() {
+            self.model.update();
+            return;
+        }
+        assert_eq!(found, Err(Error::TooManyPairs { limit }));
+        assert!(self.spaces.iter().all(|space| space.begun().is_empty() && space.ended().is_empty()));
+        match self.source.below(4) {
+            0 | 1 => self.shift(),
+            2 => self.remove(2),
+            _ => self.insert(5),
+        }
+        self.update();
+        self.insert(2);
     }
 
     /// Compares all that the spaces return without a search.
