@@ -100,8 +100,8 @@ impl Prices {
         }
     }
 
-    /// Returns whether a try of keeping boxes of this pace is worth it by what the model says. The clock ends a try that
-    /// does not pay, which counts, less and less, for the next ones.
+    /// Returns whether a try of keeping boxes of this pace is worth it by what the model says. The clock ends a try
+    /// that does not pay, which counts, less and less, for the next ones.
     pub(super) fn promise(&mut self, pace: f32, keeping: f32, scratch: f32) -> bool {
         let failed_at = f64::from(*self.failure.pace.get_or_insert(pace));
         let is_slower = f64::from(pace) < failed_at && !is_same_pace(pace.into(), failed_at);
