@@ -357,7 +357,7 @@ impl Motion {
     /// How far the boxes moved since the frame before, and how many pairs for each there are; `None` where nobody
     /// knows.
     fn known(&self, plan: &FramePlan, boxes: &[Aabb]) -> Option<(f32, f32)> {
-        // What is told may be of some frames ago.
+        // The motion in the plan may be some frames old.
         let moved = self.displacement.motion(boxes).map(|m| m.moved).or(plan.moved())?;
         // What this method has found itself may be of long ago.
         let density = plan.pairs().map(|pairs| pairs as f32 / boxes.len().max(1) as f32).or(self.density)?;
