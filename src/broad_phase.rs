@@ -84,15 +84,6 @@ pub trait BroadPhase: Send + Sync {
     fn missed_frames(&mut self, frames: u64) {
         let _ = frames;
     }
-
-    /// Runs on this many threads from the next frame on, and keeps its state. Returns `false`, and changes nothing, if
-    /// it can't: the default.
-    ///
-    /// [`Registry::create_family`](crate::Registry::create_family) makes one instance for several numbers of threads.
-    fn set_threads(&mut self, threads: u32) -> bool {
-        let _ = threads;
-        false
-    }
 }
 
 /// How a frame of an incremental algorithm came about.

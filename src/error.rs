@@ -157,11 +157,6 @@ described! {
             /// The error of the system.
             message: String,
         } = "{threads} threads can't be started: {message}",
-        /// It runs on a fixed number of threads.
-        FixedThreads {
-            /// Another number that was wanted.
-            wanted: u32,
-        } = "can't run on {wanted} threads",
         /// The tuning has the cost of another revision.
         OtherRevision {
             /// The revision of the cost.

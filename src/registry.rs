@@ -1,6 +1,6 @@
 //! The algorithms that this machine can run.
 
-use crate::algorithm::{Backend, BackendClass, MOST_THREADS, ParseIdError};
+use crate::algorithm::{Backend, BackendClass, MOST_THREADS};
 use crate::cpu::{self, Made, Method, Simd, SimdLevel, Threads, Workers};
 use crate::entry::Entry;
 use crate::{AlgorithmId, BroadPhase, Error, Unavailable};
@@ -8,8 +8,8 @@ use std::any::{Any, TypeId};
 use std::fmt;
 use std::sync::Arc;
 
-/// Makes an instance of a user's algorithm for these numbers of threads, ascending.
-type Factory = Arc<dyn Fn(&[u32]) -> Made + Send + Sync>;
+/// Makes an instance of a user's algorithm.
+type Factory = Arc<dyn Fn() -> Made + Send + Sync>;
 
 /// All known algorithms, each with the reason if it can't run here.
 ///
@@ -53,11 +53,7 @@ enum Maker {
     BuiltIn,
     /// The source of this type.
     Source(TypeId),
-    /// `is_family`: one instance runs on several numbers of threads.
-    User {
-        make: Factory,
-        is_family: bool,
-    },
+    User(Factory),
 }
 
 impl Registry {
@@ -94,30 +90,7 @@ impl Registry {
         revision: u32,
         factory: impl Fn() -> Result<Box<dyn BroadPhase>, Error> + Send + Sync + 'static,
     ) {
-        self.set(Entry::new(id, revision), Maker::User { make: Arc::new(move |_| factory()), is_family: false });
-    }
-
-    /// Adds a user's [incremental](BroadPhase::is_incremental) algorithm that runs on any of these numbers of CPU
-    /// threads and keeps its state when the number changes. Replaces algorithms with the same ids.
-    ///
-    /// `factory` gets the wanted numbers of threads, ascending. Its instance must accept each of them in
-    /// [`BroadPhase::set_threads`], and begin with the least.
-    ///
-    /// # Errors
-    /// As [`AlgorithmId::new`]; nothing is added then.
-    pub fn add_family(
-        &mut self,
-        method: &str,
-        threads: &[u32],
-        revision: u32,
-        factory: impl Fn(&[u32]) -> Result<Box<dyn BroadPhase>, Error> + Send + Sync + 'static,
-    ) -> Result<(), ParseIdError> {
-        let ids = threads.iter().map(|&k| AlgorithmId::new(method, Backend::Cpu(k))).collect::<Result<Vec<_>, _>>()?;
-        let factory: Factory = Arc::new(factory);
-        for id in ids {
-            self.set(Entry::new(id, revision), Maker::User { make: Arc::clone(&factory), is_family: true });
-        }
-        Ok(())
+        self.set(Entry::new(id, revision), Maker::User(Arc::new(factory)));
     }
 
     /// Replaces the entry with the same id, or appends it.
@@ -136,9 +109,9 @@ impl Registry {
     }
 
     /// Returns the maker of an algorithm that a user added; `None` if it is built in or a source's.
-    fn users_maker(&self, id: &AlgorithmId) -> Option<(&Factory, bool)> {
+    fn users_maker(&self, id: &AlgorithmId) -> Option<&Factory> {
         match &self.makers[self.position(id)?] {
-            Maker::User { make, is_family } => Some((make, *is_family)),
+            Maker::User(make) => Some(make),
             _ => None,
         }
     }
@@ -293,13 +266,13 @@ impl Registry {
     /// [`Error::UnknownAlgorithm`]. [`Error::Unavailable`], for example if a file from a larger machine names more
     /// threads than this one has cores.
     pub fn create(&self, id: &AlgorithmId) -> Result<Box<dyn BroadPhase>, Error> {
-        if let Some((make, _)) = self.users_maker(id) {
-            return make(&[id.threads()]);
+        if let Some(make) = self.users_maker(id) {
+            return make();
         }
         if let Some(method) = built_in(id) {
             return match self.unavailable(id.threads()) {
                 Some(reason) => Err(Error::Unavailable { algorithm: id.clone(), reason }),
-                None => self.make(method, &[id.threads()]),
+                None => (method.create)(id.threads(), &self.threads, Simd::at_most(self.simd)),
             };
         }
         self.sources.iter().find_map(|source| source.create(id)).unwrap_or_else(|| {
@@ -307,39 +280,10 @@ impl Registry {
             Err(Error::UnknownAlgorithm { text: id.to_string(), hint: format!("known here: {}", known.join(", ")) })
         })
     }
-
-    fn make(&self, method: &Method, threads: &[u32]) -> Made {
-        (method.create)(threads, &self.threads, Simd::at_most(self.simd))
-    }
-
-    /// Makes one instance for all of `ids`, which keeps its state when [`BroadPhase::set_threads`] changes the number
-    /// of threads. Returns `None`, so that each must be [created](Self::create) by itself, unless they are one
-    /// incremental method on several numbers of threads: a built-in one, or one [added as a family](Self::add_family).
-    ///
-    /// # Errors
-    /// As [`create`](Self::create).
-    pub fn create_family(&self, ids: &[&AlgorithmId]) -> Result<Option<Box<dyn BroadPhase>>, Error> {
-        let Some(first) = ids.first() else { return Ok(None) };
-        let mut threads: Vec<u32> = ids.iter().map(|id| id.threads()).collect();
-        threads.sort_unstable();
-        threads.dedup();
-        if let Some((make, _)) = self.users_maker(first) {
-            let is_same = |(other, is_family): (&Factory, bool)| is_family && Arc::ptr_eq(other, make);
-            let is_family = ids.iter().all(|id| self.users_maker(id).is_some_and(is_same));
-            return is_family.then(|| make(&threads)).transpose();
-        }
-        let Some(method) = built_in(first).filter(|method| method.is_family) else { return Ok(None) };
-        let is_built_in = |id: &&AlgorithmId| {
-            built_in(id).is_some_and(|other| other.name == method.name)
-                && self.users_maker(id).is_none()
-                && self.unavailable(id.threads()).is_none()
-        };
-        ids.iter().all(is_built_in).then(|| self.make(method, &threads)).transpose()
-    }
 }
 
 /// Returns the built-in method of an algorithm on the CPU.
-fn built_in(id: &AlgorithmId) -> Option<&'static Method> {
+pub(crate) fn built_in(id: &AlgorithmId) -> Option<&'static Method> {
     cpu::METHODS.iter().find(|m| m.name == id.method() && id.backend().class() == BackendClass::Cpu)
 }
 
@@ -362,7 +306,7 @@ pub fn usable_cores() -> u32 {
 }
 
 /// Returns 1, 2, 4, ... below `cores`, then `cores`.
-fn thread_counts(cores: u32) -> impl Iterator<Item = u32> {
+pub(crate) fn thread_counts(cores: u32) -> impl Iterator<Item = u32> {
     let cores = cores.clamp(1, MOST_THREADS);
     std::iter::successors(Some(1_u32), |k| k.checked_mul(2)).take_while(move |&k| k < cores).chain([cores])
 }

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{Algorithms, Random, assert_each_finds, naive, registries};
-use sapwise::{Aabb, BroadPhase, Error, PairOrder, Pairs, Registry};
+use sapwise::{Aabb, Error, PairOrder, Pairs, Registry};
 
 /// Returns every method on one and on three threads at every SIMD level of this machine.
 fn every_algorithm() -> Algorithms {
@@ -14,22 +14,8 @@ fn every_algorithm() -> Algorithms {
                 all.push((format!("{id} at {level}"), registry.create(&id).unwrap()));
             }
         }
-        let ids = ["pair-cache@cpu1", "pair-cache@cpu2", "pair-cache@cpu3"].map(|id| id.parse().unwrap());
-        if let Ok(Some(all_widths)) = registry.create_family(&ids.each_ref()) {
-            all.push((format!("pair_cache on changing threads at {level}"), Box::new(Roaming(all_widths, Random(7)))));
-        }
     }
     all
-}
-
-/// Changes its number of threads at random, and keeps its state.
-struct Roaming(Box<dyn BroadPhase>, Random);
-
-impl BroadPhase for Roaming {
-    fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
-        assert!(self.0.set_threads(1 + (self.1.next() * 3.0) as u32) && !self.0.set_threads(4));
-        self.0.find_pairs(boxes, pairs)
-    }
 }
 
 fn assert_all_agree(event: &str, boxes: &[Aabb], algorithms: &mut Algorithms) {

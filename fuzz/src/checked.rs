@@ -54,10 +54,7 @@ impl Checked {
         let threads = [1, 1, 2, CORES][usize::from(kind % 4)];
         let mut all: Vec<(String, Box<dyn BroadPhase>)> = Vec::new();
         for id in ids.iter().filter(|id| id.threads() == threads) {
-            // If possible, one that can change its number of threads later.
-            let family: Vec<&AlgorithmId> = ids.iter().filter(|other| other.method() == id.method()).collect();
-            let made = registry.create_family(&family).unwrap().map_or_else(|| registry.create(id), Ok);
-            all.push((id.to_string(), made.unwrap()));
+            all.push((id.to_string(), registry.create(id).unwrap()));
         }
         if kind & 4 != 0 {
             let usual = kind & 8 != 0;
@@ -65,14 +62,6 @@ impl Checked {
             all.push(("adaptive".to_owned(), Box::new(Adaptive::new(tuning, registry).unwrap())));
         }
         Self(all)
-    }
-
-    /// Changes the number of threads of those that can.
-    pub fn set_threads(&mut self, source: &mut Source<'_>) {
-        let threads = 1 + u32::from(source.byte()) % CORES;
-        for (_, algorithm) in &mut self.0 {
-            algorithm.set_threads(threads);
-        }
     }
 
     /// Runs a frame with each. Returns the pairs, unless the answer is an error.

@@ -1,4 +1,4 @@
-//! Any boxes, filters, limits, orders and numbers of threads from frame to frame: every method, `Adaptive` and
+//! Any boxes, filters, limits and orders from frame to frame: every method, `Adaptive` and
 //! `Changes` against the definitions.
 #![no_main]
 
@@ -21,10 +21,8 @@ fuzz_target!(|bytes: &[u8]| {
     let (mut changes, mut before) = (Changes::new(), BTreeSet::new());
     let (mut frames, mut tests) = (0, 0);
     while !source.is_empty() && frames < MOST.0 && tests < MOST.1 {
-        match source.byte() % 4 {
-            0 | 1 => scene.edit(&mut source),
-            2 => checked.set_threads(&mut source),
-            _ => {}
+        if source.byte() % 4 < 2 {
+            scene.edit(&mut source);
         }
         let runs = source.byte();
         for _ in 0..if runs < 128 { 1 } else { runs % 4 } {

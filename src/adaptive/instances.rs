@@ -7,7 +7,7 @@ use crate::broad_phase::{BroadPhase, FrameWork};
 use crate::error::{Error, Unavailable};
 use crate::load::FramePlan;
 use crate::pairs::Pairs;
-use crate::registry::Registry;
+use crate::registry::{Registry, built_in};
 use crate::tuning::Tuning;
 
 /// An algorithm of the tuning.
@@ -17,16 +17,13 @@ pub(crate) struct Candidate {
     pub(super) instance: Option<usize>,
 }
 
-/// Runs one candidate, or several that differ in their number of threads only and share what they keep from frame to
-/// frame.
+/// Runs one candidate.
 pub(crate) struct Instance {
     place: Place,
     /// Whether it may wait for a driver while it gets ready.
     waits: bool,
     /// Whether it builds on the frame before.
     pub(super) is_incremental: bool,
-    /// Where several share it, on how many threads it runs.
-    threads: Option<u32>,
     /// Objects that its buffers are ready for.
     ready: usize,
     /// The first frame since its last one that another one ran and of which it was not told; `None` while it goes on,
@@ -35,10 +32,10 @@ pub(crate) struct Instance {
 }
 
 impl Instance {
-    fn new(id: &AlgorithmId, algorithm: Box<dyn BroadPhase>, threads: Option<u32>) -> Self {
+    fn new(id: &AlgorithmId, algorithm: Box<dyn BroadPhase>) -> Self {
         let is_incremental = algorithm.is_incremental();
         let waits = matches!(id.backend(), Backend::Gpu(_));
-        Self { place: Place::Here(algorithm), waits, is_incremental, threads, ready: 0, left_at: None }
+        Self { place: Place::Here(algorithm), waits, is_incremental, ready: 0, left_at: None }
     }
 
     /// Gets it ready for frames of that many objects, now.
@@ -106,14 +103,6 @@ impl Instance {
         let Some(algorithm) = self.place.here() else {
             return Err(Error::Unavailable { algorithm: id.clone(), reason: Unavailable::FailedBefore });
         };
-        let wanted = id.threads();
-        if self.threads.is_some_and(|threads| threads != wanted) {
-            if !algorithm.set_threads(wanted) {
-                let reason = Unavailable::FixedThreads { wanted };
-                return Err(Error::Unavailable { algorithm: id.clone(), reason });
-            }
-            self.threads = Some(wanted);
-        }
         if let Some(left_at) = self.left_at.filter(|_| self.is_incremental) {
             algorithm.missed_frames(frame - left_at);
             // Should this frame fail, those up to it are told.
@@ -154,11 +143,16 @@ pub struct Instances {
 }
 
 impl Instances {
-    /// Of each candidate where it finds what the frame before left: one number for all that share it. `None` where
-    /// nothing is kept.
+    /// Of each candidate the number of what it keeps from frame to frame; `None` where it keeps nothing. The same number
+    /// on any number of threads, if the method itself fits them to a frame: only one of these runs.
     pub(super) fn kept(&self) -> Vec<Option<usize>> {
-        let keeps = |c: &Candidate| c.instance.filter(|&k| self.instances[k].is_incremental);
-        self.candidates.iter().map(keeps).collect()
+        let fits = |c: &Candidate| built_in(&c.id).is_some_and(|method| method.fits_threads);
+        let first = |id: &AlgorithmId| self.candidates.iter().position(|c| c.id.method() == id.method() && fits(c));
+        let kept = |(k, c): (usize, &Candidate)| {
+            c.instance.filter(|&i| self.instances[i].is_incremental)?;
+            Some(if fits(c) { first(&c.id)? } else { k })
+        };
+        self.candidates.iter().enumerate().map(kept).collect()
     }
 
     /// Which candidates can run.
@@ -171,7 +165,7 @@ impl Instances {
         if self.instances.is_empty() { Some(self.failure.take().unwrap_or(Error::NoAlgorithm)) } else { None }
     }
 
-    /// Makes the algorithms of a tuning, those that differ in their number of threads only as one where they can be.
+    /// Makes the algorithms of a tuning.
     pub fn of(tuning: &Tuning, registry: &Registry) -> Self {
         let ids = tuning.algorithms();
         let mut made = Self {
@@ -180,38 +174,13 @@ impl Instances {
             instances: Vec::new(),
             failure: None,
         };
-        let stale = |id: &AlgorithmId| {
+        for (candidate, id) in made.candidates.iter_mut().zip(ids) {
             let cost = tuning.costs.iter().find(|c| c.algorithm == *id);
-            cost.and_then(|c| registry.mismatch(id, c.revision)).map_or(Ok(()), Err)
-        };
-        for (k, &id) in ids.iter().enumerate() {
-            if made.candidates[k].instance.is_some() {
-                continue;
-            }
-            if let Err(why) = stale(id) {
-                made.failure = Some(why);
-                continue;
-            }
-            // Those that differ from it in their number of threads only and can run here.
-            let runs = |id: &AlgorithmId| !registry.entries().iter().any(|e| e.id == *id && e.unavailable.is_some());
-            let kin = |other: &&AlgorithmId| {
-                let alike = other.method() == id.method() && other.backend().class() == id.backend().class();
-                alike && runs(other) && stale(other).is_ok()
-            };
-            let family: Vec<&AlgorithmId> = ids.iter().copied().filter(kin).collect();
-            let whole = if family.contains(&id) { registry.create_family(&family).ok().flatten() } else { None };
-            if let Some(algorithm) = whole {
-                for candidate in made.candidates.iter_mut().filter(|c| family.contains(&&c.id)) {
-                    candidate.instance = Some(made.instances.len());
-                }
-                // On none of them yet, so that the first frame sets it.
-                made.instances.push(Instance::new(id, algorithm, Some(0)));
-                continue;
-            }
-            match registry.create(id) {
+            let stale = cost.and_then(|c| registry.mismatch(id, c.revision));
+            match stale.map_or_else(|| registry.create(id), Err) {
                 Ok(algorithm) => {
-                    made.candidates[k].instance = Some(made.instances.len());
-                    made.instances.push(Instance::new(id, algorithm, None));
+                    candidate.instance = Some(made.instances.len());
+                    made.instances.push(Instance::new(id, algorithm));
                 }
                 Err(why) => made.failure = Some(why),
             }

@@ -6,7 +6,7 @@
 use super::decision::{Choice, Reason};
 use super::epoch::Epoch;
 use super::part::Part;
-use super::trial::Trials;
+use super::trial::{Trial, Trials};
 use super::wait::{MOST_WAIT, Wait};
 use crate::algorithm::BackendClass;
 use crate::broad_phase::{FrameKind, FrameWork};
@@ -52,8 +52,7 @@ const KNOWN: u32 = 4;
 /// A switch that saves its price within this many frames is made at once.
 const SOON: f64 = 4.0;
 
-/// Frames of a trial: of a candidate that shares the incumbent's state, of another incremental one, of any other.
-const OF_SHARED: u32 = 8;
+/// Frames of a trial: of an incremental candidate, of any other.
 const OF_KEPT: u32 = 16;
 const OF_OTHERS: u32 = 2;
 /// A candidate is not tried if it is expected to cost this many times what the incumbent costs.
@@ -66,8 +65,10 @@ const TRIAL_DECISIONS: f64 = 0.15;
 #[derive(Debug, Clone)]
 struct Candidate {
     usable: bool,
-    /// Number of the state that it keeps from frame to frame, shared by several numbers of threads.
+    /// Number of the state that it keeps from frame to frame.
     kept: Option<usize>,
+    /// Of those that share this, the one on the most threads: it runs for all, on as many of them as it likes.
+    leader: usize,
     method: usize,
     class: usize,
     width: u32,
@@ -122,7 +123,7 @@ pub(super) struct Policy {
 }
 
 impl Policy {
-    /// `kept` has for each candidate the number of the state that it keeps from frame to frame.
+    /// `kept`: as of [`Instances`](super::instances::Instances::kept).
     pub(super) fn new(tuning: Tuning, kept: &[Option<usize>], usable: &[bool]) -> Self {
         let ids = tuning.algorithms();
         let (mut methods, mut classes): (Vec<&str>, Vec<BackendClass>) = (Vec::new(), Vec::new());
@@ -130,6 +131,7 @@ impl Policy {
         let candidates = ids.iter().enumerate().map(|(k, &id)| Candidate {
             usable: usable[k],
             kept: kept[k],
+            leader: k,
             method: number(&mut methods, id.method()),
             class: number(&mut classes, id.backend().class()),
             width: id.backend().width(),
@@ -140,7 +142,7 @@ impl Policy {
             mean_ns: 0.0,
             saved_ns: 0.0,
         });
-        Self {
+        let mut made = Self {
             candidates: candidates.collect(),
             classes: vec![Part::new(CLASS_LN); classes.len()],
             tangents: Tangents::new(tuning.costs.len()),
@@ -160,6 +162,20 @@ impl Policy {
             rest: None,
             decision_ns: 0.0,
             tuning,
+        };
+        made.lead();
+        made
+    }
+
+    /// Finds the leader of each candidate. Where the number of objects alone decides, each is its own.
+    fn lead(&mut self) {
+        for k in 0..self.candidates.len() {
+            let shares = |&other: &usize| {
+                let (one, other) = (&self.candidates[k], &self.candidates[other]);
+                other.usable && one.kept.is_some() && one.kept == other.kept && !self.is_by_count()
+            };
+            let most = (0..self.candidates.len()).filter(shares).max_by_key(|&other| self.candidates[other].width);
+            self.candidates[k].leader = most.unwrap_or(k);
         }
     }
 
@@ -193,7 +209,7 @@ impl Policy {
         let learned = |(k, cost): (usize, &AlgorithmCost)| {
             let mut cost = cost.clone();
             let none = || Residual::new(Arc::clone(&places), Vec::new(), false);
-            cost.curve.residual.get_or_insert_with(none).constant += self.correction_ln(k);
+            cost.curve.residual.get_or_insert_with(none).constant += self.correction_ln(self.candidates[k].leader);
             cost
         };
         costs.iter().enumerate().map(learned).collect()
@@ -221,6 +237,7 @@ impl Policy {
             self.incumbent = self.incumbent.filter(|&k| k != candidate);
             self.trials.running = self.trials.running.filter(|trial| trial.candidate != candidate);
         }
+        self.lead();
     }
 
     /// A frame failed: the next one runs the incumbent.
@@ -235,6 +252,7 @@ impl Policy {
             self.candidates[k].kept = kept[k];
         }
         self.kept = states(kept);
+        self.lead();
         (self.ran, self.trials.running) = (None, None);
     }
 
@@ -256,7 +274,9 @@ impl Policy {
             self.appoint(incumbent);
         }
         self.trials.earn(frames * self.candidates[incumbent].mean_ns);
-        self.trials.running = self.trials.running.filter(|trial| !trial.is_over() && reason == Reason::Stayed);
+        // The load may have changed since the trial began.
+        let goes_on = |trial: &Trial| !trial.is_over() && !self.is_hopeless(trial.candidate, incumbent);
+        self.trials.running = self.trials.running.filter(|trial| reason == Reason::Stayed && goes_on(trial));
         if reason == Reason::Stayed && self.learns && self.explores {
             self.offer_trial(incumbent);
         }
@@ -289,6 +309,10 @@ impl Policy {
         let keep = (-growth_ln / SIZE_LN).exp();
         let candidates = &mut self.candidates;
         self.tangents.evaluate(load, &self.tuning.costs, |k, ns| candidates[k].predicted_ns = ns);
+        for k in 0..self.candidates.len() {
+            let (ns, leader) = (self.candidates[k].predicted_ns, self.candidates[k].leader);
+            self.candidates[leader].predicted_ns = self.candidates[leader].predicted_ns.min(ns);
+        }
         self.candidates.iter_mut().for_each(|c| c.own.fade(keep));
         (0..self.candidates.len()).for_each(|k| self.correct(k));
     }
@@ -301,19 +325,20 @@ impl Policy {
     }
 
     fn cheapest(&self, among: impl Fn(usize) -> bool) -> Option<usize> {
-        let usable = (0..self.candidates.len()).filter(|&k| self.candidates[k].usable && among(k));
+        let usable = (0..self.candidates.len()).filter(|&k| self.is_choice(k) && among(k));
         usable.min_by(|&a, &b| self.candidates[a].mean_ns.total_cmp(&self.candidates[b].mean_ns))
+    }
+
+    /// Whether a candidate may be chosen.
+    pub(super) fn is_choice(&self, candidate: usize) -> bool {
+        let c = &self.candidates[candidate];
+        c.usable && c.leader == candidate
     }
 
     /// Whether a candidate finds its state as the previous frames left it.
     fn remembers(&self, candidate: usize) -> bool {
         let last = self.candidates[candidate].kept.and_then(|kept| self.kept[kept].last);
         last.is_some_and(|last| self.frame - last <= FORGOTTEN)
-    }
-
-    fn shares(&self, one: usize, other: usize) -> bool {
-        let kept = |k: usize| self.candidates[k].kept;
-        kept(one).is_some() && kept(one) == kept(other)
     }
 
     /// Expected nanoseconds of a first frame of a candidate.
@@ -330,8 +355,7 @@ impl Policy {
 
     /// The price of a switch: the first frame of the new one, and later that of the old one if it must begin again.
     fn price_ns(&self, from: usize, to: usize) -> f64 {
-        let forgets = self.remembers(from) && !self.shares(from, to);
-        let leave_ns = if forgets { self.first_ns(from) - self.candidates[from].mean_ns } else { 0.0 };
+        let leave_ns = if self.remembers(from) { self.first_ns(from) - self.candidates[from].mean_ns } else { 0.0 };
         leave_ns + self.enter_ns(to)
     }
 
@@ -375,6 +399,10 @@ impl Policy {
         one.class != other.class || low == high || one.method == other.method && high <= 2 * low
     }
 
+    fn is_hopeless(&self, candidate: usize, incumbent: usize) -> bool {
+        self.candidates[candidate].mean_ns > HOPELESS * self.candidates[incumbent].mean_ns
+    }
+
     /// Begins the trial that is expected to save the most beyond its price, if there is one.
     fn offer_trial(&mut self, incumbent: usize) {
         let now_ns = self.candidates[incumbent].mean_ns;
@@ -383,15 +411,10 @@ impl Policy {
         }
         let offer = |k: usize| {
             let c = &self.candidates[k];
-            let dear = c.mean_ns > HOPELESS * now_ns;
-            if k == incumbent || !c.usable || dear || !self.is_near(k, incumbent) {
+            if k == incumbent || !self.is_choice(k) || self.is_hopeless(k, incumbent) || !self.is_near(k, incumbent) {
                 return None;
             }
-            let frames = match (self.shares(k, incumbent), c.kept) {
-                (true, _) => OF_SHARED,
-                (false, Some(_)) => OF_KEPT,
-                (false, None) => OF_OTHERS,
-            };
+            let frames = if c.kept.is_some() { OF_KEPT } else { OF_OTHERS };
             let more_ns = f64::from(frames) * (c.mean_ns - now_ns).max(0.0);
             let price_ns = self.enter_ns(k) + more_ns + TRIAL_DECISIONS * self.decision_ns;
             let unknown = c.own.variance(self.frame) + self.candidates[incumbent].own.variance(self.frame);
@@ -429,12 +452,7 @@ impl Policy {
         let (kept, observed, wait) = (c.kept, c.observed, c.wait);
         let (timed, ns) = (ns.is_some(), ns.unwrap_or(c.mean_ns));
         let now_ns = self.incumbent.map_or(0.0, |k| self.candidates[k].mean_ns);
-        let over_mean = match (self.trials.running, self.incumbent, work) {
-            // A rebuild of shared state would have come with the incumbent, too.
-            (Some(_), Some(incumbent), Some(work)) if self.shares(candidate, incumbent) => work.over_mean,
-            _ => 1.0,
-        };
-        self.trials.ran(ns - over_mean * now_ns);
+        self.trials.ran(ns - now_ns);
         // A first frame shows no usual cost: if nothing is kept, its excess is known.
         let cold = entered && kept.is_none();
         let most_ns = if observed < KNOWN { f64::INFINITY } else { STANDS_OUT * first_ns };
@@ -520,7 +538,8 @@ impl Policy {
         let steps = &self.tuning.steps;
         let split = steps.partition_point(|s| s.from_objects <= objects);
         let (below, above) = self.steps.split_at(split);
-        let chosen = below.iter().rev().chain(above).copied().find(|&k| self.candidates[k].usable)?;
+        let mut leaders = below.iter().rev().chain(above).map(|&k| self.candidates[k].leader);
+        let chosen = leaders.find(|&k| self.candidates[k].usable)?;
         // Only the incumbent's own borders have a slack.
         let holds = |incumbent: usize, share: f64| {
             let scaled = (f64::from(objects) * share) as u32;

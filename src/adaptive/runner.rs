@@ -99,7 +99,7 @@ impl Runner {
         self.policy.set_as(&before);
         self.exchange(made);
         // Within a frame, so that what may block gets ready on a thread of its own.
-        (0..self.instances.len()).for_each(|k| self.warm(k, self.prepared));
+        self.choices().into_iter().for_each(|k| self.warm(k, self.prepared));
     }
 
     /// Goes on with other instances of the same algorithms.
@@ -130,7 +130,13 @@ impl Runner {
     pub(super) fn prepare(&mut self, objects: usize) {
         self.prepared = self.prepared.max(objects);
         self.take_back(true);
-        self.instances.iter_mut().for_each(|instance| instance.prepare(objects));
+        self.choices().into_iter().for_each(|k| self.instances[k].prepare(objects));
+    }
+
+    /// The instances that may be chosen.
+    fn choices(&self) -> Vec<usize> {
+        let choice = |(k, c): (usize, &Candidate)| c.instance.filter(|_| self.policy.is_choice(k));
+        self.candidates.iter().enumerate().filter_map(choice).collect()
     }
 
     /// What was decided for the last frame; `None` before the first.

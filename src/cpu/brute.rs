@@ -20,8 +20,8 @@ struct Brute {
     simd: Simd,
 }
 
-pub(super) fn create(threads: &[u32], pools: &Threads, simd: Simd) -> Made {
-    let workers = Workers::new("brute", threads[0], pools);
+pub(super) fn create(threads: u32, pools: &Threads, simd: Simd) -> Made {
+    let workers = Workers::new("brute", threads, pools);
     let (columns, outputs) = (Columns::default(), Outputs::default());
     Ok(Box::new(Brute { workers, order: Vec::new(), columns, outputs, simd }))
 }

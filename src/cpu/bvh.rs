@@ -15,8 +15,8 @@ struct Bvh {
     outputs: Outputs,
 }
 
-pub(super) fn create(threads: &[u32], pools: &Threads, simd: Simd) -> Made {
-    let workers = Workers::new("bvh", threads[0], pools);
+pub(super) fn create(threads: u32, pools: &Threads, simd: Simd) -> Made {
+    let workers = Workers::new("bvh", threads, pools);
     Ok(Box::new(Bvh {
         workers,
         tree: Tree::new(simd),

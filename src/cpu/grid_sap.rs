@@ -82,8 +82,8 @@ struct Task {
     columns: Columns,
 }
 
-pub(super) fn create(threads: &[u32], pools: &Threads, simd: Simd) -> Made {
-    let workers = Workers::new("grid-sap", threads[0], pools);
+pub(super) fn create(threads: u32, pools: &Threads, simd: Simd) -> Made {
+    let workers = Workers::new("grid-sap", threads, pools);
     Ok(Box::new(GridSap {
         bins: (0..workers.threads()).map(|_| Bins::default()).collect(),
         apart: Vec::new(),

@@ -50,11 +50,10 @@ pub(crate) struct Method {
     pub(crate) name: &'static str,
     /// Rises when its speed changes.
     pub(crate) revision: u32,
-    /// Makes an instance at a SIMD level for these numbers of threads, ascending: one number unless it is a family.
-    pub(crate) create: fn(&[u32], &Threads, Simd) -> Made,
-    /// Whether it is incremental, and one instance runs on any of its numbers of threads and keeps its state when they
-    /// change. It begins with the least.
-    pub(crate) is_family: bool,
+    /// Makes an instance for this many threads at a SIMD level.
+    pub(crate) create: fn(u32, &Threads, Simd) -> Made,
+    /// Whether it uses as many of its threads as make a frame fast: fewer are never faster.
+    pub(crate) fits_threads: bool,
 }
 
 /// An instance of a method.
@@ -62,9 +61,9 @@ pub(crate) type Made = Result<Box<dyn BroadPhase>, Error>;
 
 /// Every method, the simplest first.
 pub(crate) const METHODS: &[Method] = &[
-    Method { name: "brute", revision: 4, create: brute::create, is_family: false },
-    Method { name: "sap", revision: 4, create: sap::create, is_family: false },
-    Method { name: "grid-sap", revision: 4, create: grid_sap::create, is_family: false },
-    Method { name: "bvh", revision: 2, create: bvh::create, is_family: false },
-    Method { name: "pair-cache", revision: 4, create: pair_cache::create, is_family: true },
+    Method { name: "brute", revision: 4, create: brute::create, fits_threads: false },
+    Method { name: "sap", revision: 4, create: sap::create, fits_threads: false },
+    Method { name: "grid-sap", revision: 4, create: grid_sap::create, fits_threads: false },
+    Method { name: "bvh", revision: 2, create: bvh::create, fits_threads: false },
+    Method { name: "pair-cache", revision: 4, create: pair_cache::create, fits_threads: true },
 ];

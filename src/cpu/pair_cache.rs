@@ -14,23 +14,26 @@ mod motion;
 mod prices;
 mod sift;
 mod tree;
+mod width;
 
 use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, FrameKind, FrameWork, check_count};
 use crate::clock::{Instant, measured_ns, tells};
-use crate::cpu::Threads;
 use crate::cpu::level::Simd;
 use crate::cpu::outputs::Outputs;
 use crate::cpu::tree::{FAR, Members, Upkeep};
 use crate::cpu::workers::Workers;
+use crate::cpu::{Made, Threads};
 use crate::error::Error;
 use crate::load::{FramePlan, SceneStats};
 use crate::pairs::Pairs;
+use crate::registry::thread_counts;
 use grown::{Grown, Margin, Share};
 use motion::{Motion, Work};
 use sift::Sift;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 pub(crate) use tree::GrownTree;
+use width::Width;
 
 /// Boxes for each list of kept pairs. With a cache line each they take 256 KB, which most second-level caches hold.
 const BOXES_PER_LIST: usize = 4096;
@@ -38,10 +41,9 @@ const BOXES_PER_LIST: usize = 4096;
 /// The method; see the module.
 #[derive(Debug)]
 struct PairCache {
-    /// The workers for each number of threads, ascending, and the position of those in use.
+    /// The workers for 1, 2, 4, ... and all threads.
     widths: Vec<Workers>,
-    width: usize,
-    /// As many of these threads as frames of about this many boxes keep busy.
+    /// Those of the last frame, and the number of boxes by which they are chosen.
     workers: Workers,
     fitted_for: usize,
     outputs: Outputs,
@@ -70,19 +72,18 @@ enum Kept {
     Incomplete,
 }
 
-/// Makes an instance for any of these numbers of threads, ascending. It begins with the least.
-pub(super) fn create(threads: &[u32], pools: &Threads, simd: Simd) -> Result<Box<dyn BroadPhase>, Error> {
-    Ok(Box::new(pair_cache(threads, pools, simd, pools.timed())?))
+pub(super) fn create(threads: u32, pools: &Threads, simd: Simd) -> Made {
+    Ok(Box::new(pair_cache(threads, pools, simd, pools.timed())))
 }
 
 /// `timed`: it decides by the clock.
-fn pair_cache(threads: &[u32], pools: &Threads, simd: Simd, timed: bool) -> Result<PairCache, Error> {
-    let widths: Vec<Workers> = threads.iter().map(|&k| Workers::new("pair-cache", k, pools)).collect();
+fn pair_cache(threads: u32, pools: &Threads, simd: Simd, timed: bool) -> PairCache {
+    let widths: Vec<Workers> = thread_counts(threads).map(|k| Workers::new("pair-cache", k, pools)).collect();
     let widest = &widths[widths.len() - 1];
     let tasks = widest.tasks();
-    Ok(PairCache {
+    PairCache {
         outputs: Outputs::default(),
-        motion: Motion::new(timed, widths.len()),
+        motion: Motion::new(timed),
         grown: Grown::new(simd),
         tree: GrownTree::new(simd),
         upkeep: Upkeep::new(timed),
@@ -91,9 +92,8 @@ fn pair_cache(threads: &[u32], pools: &Threads, simd: Simd, timed: bool) -> Resu
         last_frame: FrameKind::FromScratch,
         workers: widths[0].fit(0),
         fitted_for: 0,
-        width: 0,
         widths,
-    })
+    }
 }
 
 impl BroadPhase for PairCache {
@@ -105,12 +105,15 @@ impl BroadPhase for PairCache {
         pairs.clear();
         check_count(boxes.len())?;
         self.fit(boxes.len());
+        let started = Instant::now();
+        let margin = self.motion.advise(plan, boxes);
+        self.workers = self.workers_for(margin.is_some());
         let _frame = self.workers.frame()?;
-        let kept = match self.motion.advise(plan, boxes) {
+        let kept = match margin {
             None => Kept::Incomplete,
             Some(margin) => {
                 self.upkeep.forget();
-                let kept = self.keep(plan, boxes, margin, pairs);
+                let kept = self.keep(plan, boxes, (margin, started), pairs);
                 if kept != Ok(Kept::Pays) {
                     // The grown boxes may be half of this frame and half of the previous one.
                     self.grown.forget();
@@ -153,14 +156,6 @@ impl BroadPhase for PairCache {
     fn missed_frames(&mut self, frames: u64) {
         self.motion.missed(frames);
     }
-
-    fn set_threads(&mut self, threads: u32) -> bool {
-        let Some(width) = self.widths.iter().position(|w| w.threads() == threads as usize) else { return false };
-        self.width = width;
-        self.motion.set_width(width);
-        self.workers = self.widths[width].fit(self.fitted_for);
-        true
-    }
 }
 
 /// Returns the most pairs that one of the lists of `tasks` tasks may keep: four equal shares of a task, because a dense
@@ -170,25 +165,45 @@ fn most_of_list(most_kept: usize, tasks: usize) -> usize {
 }
 
 impl PairCache {
-    /// Takes as many threads of this width as a frame of `boxes` boxes keeps busy. They stay until that number changes
-    /// by a factor of two. Then the cost of a box is unknown, and nothing is kept.
+    /// Notes the number of boxes, until it changes by a factor of two. Then the cost of a box is unknown, and nothing is
+    /// kept.
     fn fit(&mut self, boxes: usize) {
         let before = self.fitted_for;
         if boxes <= 2 * before.max(1) && before <= 2 * boxes.max(1) {
             return;
         }
         self.fitted_for = boxes;
-        self.workers = self.widths[self.width].fit(boxes);
         self.grown.forget();
-        self.motion.resize();
+        // Keeping takes about half as long as finding from scratch.
+        self.motion.resize([boxes / 2, boxes].map(|boxes| Width::new(self.position(boxes))));
         // Lists for all tasks of any width: another number of threads deals nothing out anew.
         let tasks = self.widths[self.widths.len() - 1].fit(boxes).tasks();
         self.kept.resize_with(tasks * boxes.div_ceil(tasks * BOXES_PER_LIST).max(1), Pairs::new);
     }
 
+    /// Returns the position of the threads that a frame of `boxes` boxes keeps busy.
+    fn position(&self, boxes: usize) -> usize {
+        let most = self.widths.len() - 1;
+        let threads = self.widths[most].fit(boxes).threads();
+        self.widths.iter().position(|w| w.threads() >= threads).unwrap_or(most)
+    }
+
+    /// Returns the threads of the next frame.
+    fn workers_for(&mut self, keeps: bool) -> Workers {
+        let most = self.position(self.fitted_for);
+        let prices = &mut self.motion.prices;
+        let width = if keeps { prices.keepers.next(most) } else { prices.searchers.next(most) };
+        self.widths[width].fit(self.fitted_for)
+    }
+
     /// Finds the pairs among the kept ones.
-    fn keep(&mut self, plan: &FramePlan, boxes: &[Aabb], margin: Margin, pairs: &mut Pairs) -> Result<Kept, Error> {
-        let started = Instant::now();
+    fn keep(
+        &mut self,
+        plan: &FramePlan,
+        boxes: &[Aabb],
+        (margin, started): (Margin, Instant),
+        pairs: &mut Pairs,
+    ) -> Result<Kept, Error> {
         let Self { workers, outputs, motion, grown, tree, shares, kept, last_frame, .. } = self;
         let workers = &*workers;
         let shares = &mut shares[..workers.tasks()];
@@ -257,7 +272,7 @@ mod tests {
     use FrameKind::{FromScratch, Rebuilt, Updated};
 
     fn frames(scenario: Scenario, count: usize, plan: &FramePlan) -> Vec<FrameWork> {
-        let mut method = pair_cache(&[1], &Threads::default(), Simd::Portable, false).unwrap();
+        let mut method = pair_cache(1, &Threads::default(), Simd::Portable, false);
         let mut scene = Scene::start(scenario, 1000, 1);
         let mut pairs = Pairs::new();
         let frame = |_| {
@@ -280,7 +295,7 @@ mod tests {
 
     #[test]
     fn frame_without_a_box_keeps_no_pair_of_an_earlier_one() {
-        let mut method = pair_cache(&[1], &Threads::default(), Simd::Portable, false).unwrap();
+        let mut method = pair_cache(1, &Threads::default(), Simd::Portable, false);
         let mut pairs = Pairs::new();
         for boxes in [20, 0, 20].map(|count| vec![Aabb::cube([0.0; 3], 1.0); count]) {
             let overlapping = boxes.len() * boxes.len().saturating_sub(1) / 2;
@@ -292,7 +307,7 @@ mod tests {
 
     #[test]
     fn nothing_is_kept_at_first_when_the_number_of_boxes_has_doubled() {
-        let mut method = pair_cache(&[1], &Threads::default(), Simd::Portable, true).unwrap();
+        let mut method = pair_cache(1, &Threads::default(), Simd::Portable, true);
         let mut pairs = Pairs::new();
         for (objects, frames) in [(400, 100), (1000, 3), (400, 3)] {
             let scene = Scene::start(Scenario::Resting, objects, 1);
@@ -325,7 +340,7 @@ mod tests {
 
     #[test]
     fn boxes_that_come_to_rest_keep_few_pairs() {
-        let method = || pair_cache(&[1], &Threads::default(), Simd::Portable, false).unwrap();
+        let method = || pair_cache(1, &Threads::default(), Simd::Portable, false);
         let rested = *kept(&mut method(), (0..100).map(|_| 0.0), false).last().unwrap();
         let kept = kept(&mut method(), (0..160).map(to_and_fro).chain((0..500).map(|_| 0.0)), false);
         let (moved, late) = (kept[150], kept[659]);
@@ -335,7 +350,7 @@ mod tests {
 
     #[test]
     fn margin_after_frames_of_others_follows_the_new_motion() {
-        let mut method = pair_cache(&[1], &Threads::default(), Simd::Portable, false).unwrap();
+        let mut method = pair_cache(1, &Threads::default(), Simd::Portable, false);
         let moving = *kept(&mut method, (0..160).map(to_and_fro), true).last().unwrap();
         // As after a hundred frames of another method, in which all boxes went elsewhere.
         let mut pairs = Pairs::new();
@@ -349,14 +364,14 @@ mod tests {
     /// Boxes wander, jump, come and go; the tree is sorted anew in between.
     #[test]
     fn pairs_are_right_while_the_tree_is_renewed() {
-        let threads: &[u32] = if cfg!(feature = "parallel") { &[1, 2] } else { &[1] };
+        let threads = if cfg!(feature = "parallel") { 2 } else { 1 };
         let mut random = 0;
         let mut unit = || {
             random += 1;
             (crate::splitmix::mix(random) >> 40) as f32 / (1 << 24) as f32
         };
         for simd in Simd::every() {
-            let mut method = pair_cache(threads, &Threads::default(), simd, false).unwrap();
+            let mut method = pair_cache(threads, &Threads::default(), simd, false);
             let mut boxes: Vec<Aabb> = (0..2100).map(|_| Aabb::cube([0; 3].map(|_| unit() * 25.0), 0.5)).collect();
             let (mut pairs, mut places, mut renewals, mut kept) = (Pairs::new(), 0, 0, 0);
             for frame in 0..160 {
@@ -373,7 +388,7 @@ mod tests {
                     100..120 => boxes.push(Aabb::cube([unit() * 25.0; 3], 0.5)),
                     _ => {}
                 }
-                method.set_threads(threads[frame / 40 % threads.len()]);
+                method.motion.prices.keepers = Width::new(frame / 40 % 2);
                 method.find_pairs(&boxes, &mut pairs).unwrap();
                 let expected = double_loop(&boxes, |_| true);
                 assert_eq!(pairs.fingerprint(), expected.fingerprint(), "{simd:?}, frame {frame}");

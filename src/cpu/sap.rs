@@ -17,8 +17,8 @@ struct Sap {
     simd: Simd,
 }
 
-pub(super) fn create(threads: &[u32], pools: &Threads, simd: Simd) -> Made {
-    let workers = Workers::new("sap", threads[0], pools);
+pub(super) fn create(threads: u32, pools: &Threads, simd: Simd) -> Made {
+    let workers = Workers::new("sap", threads, pools);
     let (columns, outputs) = (Columns::default(), Outputs::default());
     Ok(Box::new(Sap { workers, keys: Vec::new(), scratch: Vec::new(), columns, outputs, simd }))
 }

@@ -262,7 +262,7 @@ mod tests {
         for method in METHODS {
             let (name, simd) = (method.name, Simd::at_most(SimdLevel::in_use()));
             let (threads, helpers, _gates) = busy_helpers();
-            let mut algorithm = (method.create)(&[128], &threads, simd).unwrap();
+            let mut algorithm = (method.create)(128, &threads, simd).unwrap();
             let mut pairs = Pairs::new();
             algorithm.find_pairs(&scene(1000), &mut pairs).unwrap();
             assert_eq!(helpers.coming(), 0, "{name}: 1000 boxes");

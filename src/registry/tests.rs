@@ -39,41 +39,6 @@ fn clock_stays_ignored_in_a_pool() {
     assert!(registry.threads.untimed);
 }
 
-/// Accepts these numbers of threads.
-struct Wide(Vec<u32>);
-
-impl BroadPhase for Wide {
-    fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
-        pairs.clear();
-        pairs.finish()
-    }
-
-    fn is_incremental(&self) -> bool {
-        true
-    }
-
-    fn set_threads(&mut self, threads: u32) -> bool {
-        self.0.contains(&threads)
-    }
-}
-
-#[test]
-fn family_is_one_instance_for_several_numbers_of_threads() {
-    let mut registry = Registry::with_cores(1);
-    registry.add_family("mine", &[1, 2, 4], 3, |threads| Ok(Box::new(Wide(threads.to_vec())))).unwrap();
-    assert!(registry.add_family("Mine", &[1], 3, |_| unreachable!()).is_err());
-    let ids: Vec<AlgorithmId> =
-        ["mine@cpu4", "mine@cpu1", "brute@cpu1", "mine@cpu2"].map(|t| t.parse().unwrap()).into();
-    let mut family = registry.create_family(&[&ids[0], &ids[1]]).unwrap().unwrap();
-    assert_eq!([1, 2, 4].map(|k| family.set_threads(k)), [true, false, true]);
-    assert!(registry.create_family(&[&ids[1], &ids[2]]).unwrap().is_none());
-    assert!(registry.create_family(&[]).unwrap().is_none());
-    assert!(registry.create(&ids[3]).unwrap().is_incremental());
-    // A replaced algorithm leaves the family.
-    registry.add(ids[3].clone(), 1, || Ok(Box::new(Nothing)));
-    assert!(registry.create_family(&[&ids[0], &ids[3]]).unwrap().is_none());
-}
-
 #[test]
 fn no_file_starts_more_threads_than_there_are_cores() {
     let registry = Registry::with_cores(3);
@@ -83,8 +48,6 @@ fn no_file_starts_more_threads_than_there_are_cores() {
         if cfg!(feature = "parallel") {
             assert!(error.to_string().contains("but this machine has 3"), "{error}");
         }
-        // Nor as a family.
-        assert!(registry.create_family(&[&"pair-cache@cpu1".parse().unwrap(), &id]).unwrap().is_none());
         // Nor does a tuning of steps.
         let step = |from_objects, id: &str| crate::tuning::Step { from_objects, algorithm: id.parse().unwrap() };
         let tuning = crate::Tuning::from_steps(vec![step(0, text), step(20, "brute@cpu1")]).unwrap();

@@ -154,6 +154,21 @@ fn a_frame_of_a_trial_that_fails_ends_the_trial() {
 }
 
 #[test]
+fn a_trial_ends_where_the_load_makes_it_hopeless() {
+    // For 100 objects each takes about 12 us, for 20 000 the second takes six times as long.
+    let mut policy = policy(tuning(&[("grid-sap@cpu1", 10_000.0, 20.0), ("brute@cpu1", 0.0, 125.0)]));
+    let mut tries = |objects| {
+        let choice = policy.choose(&Load::of_objects(objects)).unwrap();
+        if !policy.tries() {
+            ran(&mut policy, choice.chosen, 12_000.0, None);
+        }
+        policy.tries().then_some(choice.chosen)
+    };
+    let tried = (0..300).find_map(|_| tries(100));
+    assert_eq!((tried, tries(100), tries(20_000)), (Some(1), Some(1), None));
+}
+
+#[test]
 fn without_learning_wrong_tuning_stay_wrong() {
     let wrong = tuning(&[("grid-sap@cpu1", 0.0, 100.0), ("brute@cpu1", 0.0, 120.0)]);
     let truth = |k: usize, n: f64, _: usize| n * [300.0, 100.0][k];

@@ -26,7 +26,9 @@ fn mean_regret(range: Range<usize>, own_ln: f64, disturb: impl Fn(u32, usize, u6
         let mut chance = Chance(seed);
         let class = (CLASS_LN * chance.normal()).exp();
         let costs = PREDICTED.map(|(_, ns)| ns * class * (own_ln * chance.normal()).exp());
-        let truth = move |k: usize, n: f64, at: usize| n * costs[k] * disturb(1 + k as u32 % 2, at, seed);
+        let one = move |k: usize, at: usize| costs[k] * disturb(1 + k as u32 % 2, at, seed);
+        // `pair-cache` on two threads runs on one where that is faster.
+        let truth = move |k: usize, n: f64, at: usize| n * if k == 1 { one(0, at).min(one(1, at)) } else { one(k, at) };
         let truth: &Truth = &truth;
         let of = |k: usize| range.clone().map(|at| truth(k, f64::from(OBJECTS), at)).sum::<f64>();
         let best_ns = (0..costs.len()).map(of).fold(f64::INFINITY, f64::min);
@@ -63,6 +65,6 @@ fn over_a_thousand_seeds_the_policy_recovers_from_what_disturbs_it() {
     ];
     for (what, regret, most) in cases {
         println!("{what}, {SEEDS} seeds: mean regret {:.2} %", 100.0 * regret);
-        assert!(regret > 0.0 && regret <= most, "{what}: {regret}");
+        assert!((-1.0e-9..=most).contains(&regret), "{what}: {regret}");
     }
 }

@@ -163,12 +163,6 @@ impl BroadPhase for Played {
     fn last_frame(&self) -> FrameWork {
         self.work
     }
-
-    fn set_threads(&mut self, threads: u32) -> bool {
-        let method = self.stage.trace.ids[self.column].method();
-        self.column = self.stage.trace.column(&format!("{method}@cpu{threads}"));
-        true
-    }
 }
 
 /// The time of a run of the adaptive choice, in nanoseconds.
@@ -177,16 +171,8 @@ fn play(trace: &Arc<Trace>, tuning: &Tuning) -> f64 {
         Arc::new(Stage { trace: Arc::clone(trace), frame: AtomicUsize::new(0), before: AtomicUsize::new(usize::MAX) });
     let mut registry = Registry::with_cores(1);
     for id in &trace.ids {
-        let made = (Arc::clone(&stage), id.clone());
-        if keeps(id) {
-            let alike = trace.ids.iter().filter(|i| i.method() == id.method());
-            let threads: Vec<u32> = alike.map(AlgorithmId::threads).collect();
-            registry
-                .add_family(id.method(), &threads, 1, move |_| Ok(Box::new(Played::new(&made.0, &made.1))))
-                .unwrap();
-        } else {
-            registry.add(id.clone(), 1, move || Ok(Box::new(Played::new(&made.0, &made.1))));
-        }
+        let (stage, of) = (Arc::clone(&stage), id.clone());
+        registry.add(id.clone(), 1, move || Ok(Box::new(Played::new(&stage, &of))));
     }
     let mut adaptive = Adaptive::new(tuning.clone(), &registry).unwrap();
     let mut scene = Scene::start(trace.scenario, trace.most_objects, trace.seed);

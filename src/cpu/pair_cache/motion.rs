@@ -6,6 +6,7 @@ mod tests;
 
 use super::grown::{Changes, Margin};
 use super::prices::Prices;
+use super::width::Width;
 use crate::aabb::Aabb;
 use crate::cpu::tree::Wear;
 use crate::load::{Displacement, FramePlan, is_same_pace};
@@ -81,7 +82,7 @@ pub(super) struct Motion {
     /// No larger margin is begun with: that one kept too many pairs, of boxes near one another that do not overlap
     /// yet.
     most_margin: f32,
-    prices: Prices,
+    pub(super) prices: Prices,
 }
 
 /// What is known while pairs are kept.
@@ -148,8 +149,8 @@ impl Keeping {
 }
 
 impl Motion {
-    /// `timed`: measured times decide, and not the cost model alone. `widths`: numbers of threads.
-    pub(super) fn new(timed: bool, widths: usize) -> Self {
+    /// `timed`: measured times decide, and not the cost model alone.
+    pub(super) fn new(timed: bool) -> Self {
         Self {
             displacement: Displacement::default(),
             density: None,
@@ -158,7 +159,7 @@ impl Motion {
             next_pause: 0,
             told: None,
             most_margin: MARGINS[MARGINS.len() - 1],
-            prices: Prices::new(timed, widths),
+            prices: Prices::new(timed),
         }
     }
 
@@ -218,12 +219,6 @@ impl Motion {
         self.pause = 1;
     }
 
-    /// Goes on with another number of threads. Which margin failed on others says little.
-    pub(super) fn set_width(&mut self, width: usize) {
-        self.prices.set_width(width);
-        self.most_margin = MARGINS[MARGINS.len() - 1];
-    }
-
     /// Other algorithms ran this many frames since the last one of this.
     pub(super) fn missed(&mut self, frames: u64) {
         // Of boxes before all of these.
@@ -232,10 +227,11 @@ impl Motion {
         self.prices.fade(frames);
     }
 
-    /// The number of boxes has changed by a factor of two or more: what a box costs is to be learned again.
-    pub(super) fn resize(&mut self) {
+    /// The number of boxes has changed by a factor of two or more: what a box costs is to be learned again. `widths`:
+    /// on how many threads pairs are kept and found from scratch at first.
+    pub(super) fn resize(&mut self, widths: [Width; 2]) {
         self.interrupt();
-        self.prices.forget();
+        self.prices.forget(widths);
     }
 
     /// A frame failed for no fault of keeping.

@@ -1,5 +1,6 @@
 //! What frames cost by the clock: with kept pairs, and from scratch.
 
+use super::width::Width;
 use crate::cpu::mean_time::MeanTime;
 use crate::load::is_same_pace;
 
@@ -32,9 +33,14 @@ const FORGETTING: f32 = 512.0;
 pub(super) struct Prices {
     /// Without a clock, and if it is too coarse, a frame takes what the model says.
     timed: bool,
-    /// By number of threads, and the one in use: a second thread that is slow to wake says nothing of the first.
-    widths: Vec<OfWidth>,
-    width: usize,
+    /// Number of frames from scratch, and cost of the mean one.
+    frames: u32,
+    of_scratch: MeanTime,
+    /// Cost of the mean frame with kept pairs, over that.
+    keeping: MeanTime,
+    /// On how many threads pairs are kept, and found from scratch.
+    pub(super) keepers: Width,
+    pub(super) searchers: Width,
     /// Cost of keeping beyond that of frames from scratch, in such frames, since it was last below.
     lost: f32,
     /// What the model said of keeping and of finding from scratch when keeping began.
@@ -54,49 +60,42 @@ struct Failure {
     pace: Option<f32>,
 }
 
-/// What frames on one number of threads have shown.
-#[derive(Debug, Clone, Copy)]
-struct OfWidth {
-    /// Number of frames from scratch.
-    frames: u32,
-    /// Of the mean frame from scratch, and of the mean frame with kept pairs over that.
-    scratch: MeanTime,
-    keeping: MeanTime,
-}
-
 impl Prices {
-    /// For this many numbers of threads, of which the first is in use.
-    pub(super) fn new(timed: bool, widths: usize) -> Self {
-        let unknown = OfWidth { frames: 0, scratch: MeanTime::default(), keeping: MeanTime::of(1.0) };
-        let failure = Failure { over: 1.0, pace: None };
-        let (widths, promised, kept) = (vec![unknown; widths], [0.0; 2], [0.0; 2]);
-        Self { timed, widths, width: 0, lost: 0.0, promised, kept, failure }
-    }
-
-    /// Goes on with another number of threads.
-    pub(super) fn set_width(&mut self, width: usize) {
-        self.width = width;
-    }
-
-    fn now(&mut self) -> &mut OfWidth {
-        &mut self.widths[self.width]
+    pub(super) fn new(timed: bool) -> Self {
+        Self {
+            timed,
+            frames: 0,
+            of_scratch: MeanTime::default(),
+            keeping: MeanTime::of(1.0),
+            keepers: Width::new(0),
+            searchers: Width::new(0),
+            lost: 0.0,
+            promised: [0.0; 2],
+            kept: [0.0; 2],
+            failure: Failure { over: 1.0, pace: None },
+        }
     }
 
     /// Forgets what a box costs, and not how keeping and finding from scratch compare.
-    pub(super) fn forget(&mut self) {
-        self.widths.iter_mut().for_each(|w| (w.frames, w.scratch) = (0, MeanTime::default()));
+    pub(super) fn forget(&mut self, [keepers, searchers]: [Width; 2]) {
+        (self.frames, self.of_scratch, self.keepers) = (0, MeanTime::default(), keepers);
+        self.searchers = searchers;
     }
 
     /// Learns from a frame from scratch, of which the model says `model`.
     pub(super) fn add_scratch(&mut self, took: Option<f32>, model: f32) {
-        let took = took.filter(|_| self.timed).unwrap_or(model);
-        let of = self.now();
-        of.frames = of.frames.saturating_add(1);
+        let took = took.filter(|_| self.timed);
+        self.frames = self.frames.saturating_add(1);
+        let counts = self.frames >= FIRST_COUNTED;
+        if counts && took.is_some_and(|took| !self.searchers.ran(took / model)) {
+            return;
+        }
+        let took = took.unwrap_or(model);
         let cost = f64::from(took / model);
-        if of.frames > FEWEST_FRAMES {
-            of.scratch.add(cost);
-        } else if of.frames >= FIRST_COUNTED {
-            of.scratch = MeanTime::of(of.scratch.get().map_or(cost, |least| least.min(cost)));
+        if self.frames > FEWEST_FRAMES {
+            self.of_scratch.add(cost);
+        } else if counts {
+            self.of_scratch = MeanTime::of(self.of_scratch.get().map_or(cost, |least| least.min(cost)));
         }
     }
 
@@ -106,9 +105,8 @@ impl Prices {
         let failed_at = f64::from(*self.failure.pace.get_or_insert(pace));
         let is_slower = f64::from(pace) < failed_at && !is_same_pace(pace.into(), failed_at);
         let over = if is_slower { self.failure.over.min(WARY) } else { self.failure.over };
-        let OfWidth { frames, keeping: measured, .. } = *self.now();
-        let measured = measured.get().unwrap_or(1.0) as f32;
-        over * measured * keeping < scratch && (!self.timed || frames >= FEWEST_FRAMES)
+        let measured = self.keeping.get().unwrap_or(1.0) as f32;
+        over * measured * keeping < scratch && (!self.timed || self.frames >= FEWEST_FRAMES)
     }
 
     /// Begins a try that promised this.
@@ -123,13 +121,7 @@ impl Prices {
         let faded = |over: f64| 1.0 + (over - 1.0) * kept;
         self.failure.pace.get_or_insert(f32::INFINITY);
         self.failure.over = faded(self.failure.over.into()) as f32;
-        self.widths.iter_mut().for_each(|w| w.keeping = MeanTime::of(w.keeping.get().map_or(1.0, faded)));
-    }
-
-    /// On the threads in use, or on others if no frame from scratch has run on these.
-    fn of_scratch(&self) -> f32 {
-        let mut known = self.widths[self.width..].iter().chain(&self.widths).filter_map(|w| w.scratch.get());
-        known.next().unwrap_or(1.0) as f32
+        self.keeping = MeanTime::of(self.keeping.get().map_or(1.0, faded));
     }
 
     /// Ends a try that did not pay, or that had too many pairs to keep, at any pace.
@@ -145,16 +137,22 @@ impl Prices {
     /// Learns from a frame with kept pairs. `work`, `scratch`: what the model says of it, and of one from scratch.
     /// Returns whether to go on.
     pub(super) fn pays(&mut self, took: Option<f32>, work: f32, scratch: f32) -> bool {
-        let of_scratch = self.of_scratch();
-        let (expected, scratch) = (work * of_scratch, scratch * of_scratch);
-        let took = took.filter(|_| self.timed).unwrap_or(expected);
-        let mut most = MOST_OF_FIRST * scratch;
+        let took = took.filter(|_| self.timed);
         self.kept[1] += 1.0;
-        if self.kept[1] > 0.0 {
+        let is_first = self.kept[1] <= 0.0;
+        if !is_first {
             self.kept[0] += work;
-            let measured = &mut self.now().keeping;
-            most = MOST_RISE * expected * measured.get().unwrap_or(1.0) as f32;
-            measured.add(f64::from(took / expected));
+            if took.is_some_and(|took| !self.keepers.ran(took / work)) {
+                return true;
+            }
+        }
+        let of_scratch = self.of_scratch.get().unwrap_or(1.0) as f32;
+        let (expected, scratch) = (work * of_scratch, scratch * of_scratch);
+        let took = took.unwrap_or(expected);
+        let mut most = MOST_OF_FIRST * scratch;
+        if !is_first {
+            most = MOST_RISE * expected * self.keeping.get().unwrap_or(1.0) as f32;
+            self.keeping.add(f64::from(took / expected));
         }
         // NaN, of 0 over 0, counts as 0.
         self.lost = (self.lost + took.min(most) / scratch - 1.0).max(0.0);
@@ -176,9 +174,8 @@ mod tests {
 
     /// After frames from scratch that took 50 ns a box, of which the model says 40, and the beginning of a try that
     /// promises to take 30 instead. Boxes move by a tenth of an edge.
-    fn keeping(widths: usize, width: usize) -> Prices {
-        let mut prices = Prices::new(true, widths);
-        prices.set_width(width);
+    fn keeping() -> Prices {
+        let mut prices = Prices::new(true);
         (0..10).for_each(|_| prices.add_scratch(Some(50.0), 40.0));
         assert!(begins(&mut prices, 0.1, 30.0, 40.0) && prices.pays(Some(200.0), 90.0, 40.0));
         prices
@@ -186,7 +183,7 @@ mod tests {
 
     #[test]
     fn keeping_is_tried_after_six_frames_and_stops_when_it_has_lost_four() {
-        let mut prices = Prices::new(true, 1);
+        let mut prices = Prices::new(true);
         for frame in 0..6 {
             assert!(!begins(&mut prices, 0.1, 10.0, 40.0));
             // The tree is built, and one frame is interrupted.
@@ -207,7 +204,7 @@ mod tests {
     #[test]
     fn interruptions_are_no_reason_to_stop_and_frames_that_have_much_to_do_are() {
         let frames = |every: u32, work: f32| {
-            let mut prices = keeping(1, 0);
+            let mut prices = keeping();
             let pays = |k: &u32| {
                 let (took, work) = if k.is_multiple_of(every) { (5000.0, work) } else { (40.0, 30.0) };
                 prices.pays(Some(took), work, 40.0)
@@ -226,7 +223,7 @@ mod tests {
 
     #[test]
     fn slow_frames_count_for_the_next_promises() {
-        let mut prices = keeping(1, 0);
+        let mut prices = keeping();
         while prices.pays(Some(52.0), 30.0, 40.0) {}
         prices.failed(false);
         // Frames took 1.39 times what their work promised.
@@ -241,7 +238,7 @@ mod tests {
 
     #[test]
     fn more_work_than_promised_counts_unless_boxes_move_more_slowly() {
-        let mut prices = keeping(1, 0);
+        let mut prices = keeping();
         while prices.pays(Some(75.0), 60.0, 40.0) {}
         prices.failed(false);
         // Kept pairs were twice the promised work, at this pace.
@@ -258,20 +255,20 @@ mod tests {
     }
 
     #[test]
-    fn slow_frames_on_two_threads_do_not_count_on_one() {
-        let mut prices = keeping(2, 1);
-        while prices.pays(Some(90.0), 30.0, 40.0) {}
-        prices.failed(false);
-        assert!(begins_at(&prices, 0.1) < 25);
-        prices.set_width(0);
-        assert!(!begins(&mut prices, 0.1, 10.0, 40.0), "no frame from scratch has run on one thread");
-        (0..6).for_each(|_| prices.add_scratch(Some(50.0), 40.0));
-        assert_eq!(begins_at(&prices, 0.1), 36);
+    fn threads_that_are_slow_to_wake_are_no_reason_to_stop() {
+        let mut prices = keeping();
+        let mut tried = 0;
+        for frame in 0..5000 {
+            let width = prices.keepers.next(1);
+            tried += width;
+            assert!(prices.pays(Some([30.0, 400.0][width]), 30.0, 40.0), "frame {frame}");
+        }
+        assert!((1..40).contains(&tried), "{tried} frames");
     }
 
     #[test]
     fn without_a_clock_the_model_decides() {
-        let mut prices = Prices::new(false, 1);
+        let mut prices = Prices::new(false);
         assert!(begins(&mut prices, 0.1, 39.0, 40.0) && !begins(&mut prices, 0.1, 41.0, 40.0));
         assert!((0..100).all(|_| prices.pays(Some(1.0e9), 39.0, 40.0)));
         assert!(!(0..100).all(|_| prices.pays(Some(0.0), 43.0, 40.0)));

@@ -173,7 +173,7 @@ mod tests {
     fn pairs_of_long_boxes_are_right_in_every_frame_of_churn() {
         const FRAMES: u64 = 36;
         let workers = workers();
-        let mut oracle = crate::cpu::brute::create(&[1], &Threads::default(), Simd::Portable).unwrap();
+        let mut oracle = crate::cpu::brute::create(1, &Threads::default(), Simd::Portable).unwrap();
         let mut trees: Vec<_> = Simd::every().map(|simd| (Tree::new(simd), Upkeep::new(false))).collect();
         let mut random = 0;
         let mut below = |n: usize| {

@@ -7,7 +7,7 @@ fn shift(boxes: &mut [Aabb], by: f32) {
 
 fn keeps(scenario: Scenario) -> bool {
     let mut scene = Scene::start(scenario, 2000, 1);
-    let mut motion = Motion::new(false, 1);
+    let mut motion = Motion::new(false);
     motion.advise(&FramePlan::default(), scene.boxes());
     motion.found(2000, 1000);
     scene.advance();
@@ -23,7 +23,7 @@ fn pairs_are_kept_where_boxes_move_little_and_not_where_they_move_far() {
 #[test]
 fn too_many_pairs_are_not_kept_and_a_failure_is_not_tried_again_soon() {
     let boxes = vec![Aabb::cube([0.0; 3], 1.0); 500];
-    let mut motion = Motion::new(false, 1);
+    let mut motion = Motion::new(false);
     let keeps = |motion: &mut Motion| motion.advise(&FramePlan::default(), &boxes).is_some();
     for pairs in [500 * 499 / 2, 1000] {
         motion.found(500, pairs);
@@ -44,7 +44,7 @@ fn too_many_pairs_are_not_kept_and_a_failure_is_not_tried_again_soon() {
 fn keeping_begins_again_when_boxes_that_moved_too_far_come_to_rest() {
     let plan = FramePlan::default().with_pairs(Some(500.0));
     let mut boxes = vec![Aabb::cube([0.0; 3], 0.5); 1000];
-    let mut motion = Motion::new(false, 1);
+    let mut motion = Motion::new(false);
     let mut keeps = |motion: &mut Motion, by: f32| {
         shift(&mut boxes, by);
         motion.advise(&plan, &boxes).is_some()
@@ -65,7 +65,7 @@ fn where_half_of_the_boxes_leave_at_once_the_margin_stays_unless_they_move_at_an
     let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
     let plan = |moved| FramePlan::default().with_moved(Some(moved)).with_pairs(Some(500.0));
     let share_after = |moved: f64| {
-        let mut motion = Motion::new(false, 1);
+        let mut motion = Motion::new(false);
         motion.advise(&plan(0.02), &boxes);
         // As found in many frames.
         motion.keeping.as_mut().unwrap().margin.share = 0.123;
@@ -79,7 +79,7 @@ fn where_half_of_the_boxes_leave_at_once_the_margin_stays_unless_they_move_at_an
 
 #[test]
 fn boxes_are_sorted_anew_when_queries_have_become_expensive() {
-    let mut motion = Motion::new(false, 1);
+    let mut motion = Motion::new(false);
     let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
     motion.found(1000, 0);
     (0..2).for_each(|_| _ = motion.advise(&FramePlan::default(), &boxes));
@@ -102,7 +102,7 @@ fn boxes_are_sorted_anew_when_queries_have_become_expensive() {
 
 #[test]
 fn boxes_with_too_wide_a_margin_all_get_a_smaller_one_within_some_frames() {
-    let mut motion = Motion::new(false, 1);
+    let mut motion = Motion::new(false);
     let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
     motion.found(1000, 1000);
     (0..2).for_each(|_| _ = motion.advise(&FramePlan::default(), &boxes));
@@ -119,7 +119,7 @@ fn boxes_with_too_wide_a_margin_all_get_a_smaller_one_within_some_frames() {
 #[test]
 fn where_no_boxes_overlap_the_margin_is_no_larger_than_slow_boxes_need_and_few_pairs_may_be_kept() {
     let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
-    let mut motion = Motion::new(false, 1);
+    let mut motion = Motion::new(false);
     motion.found(1000, 0);
     let plan = FramePlan::default().with_moved(Some(0.005));
     motion.advise(&plan, &boxes);
@@ -132,7 +132,7 @@ fn where_no_boxes_overlap_the_margin_is_no_larger_than_slow_boxes_need_and_few_p
 fn a_margin_that_keeps_too_many_pairs_is_halved_and_one_that_too_many_leave_is_not() {
     let margin_after = |kept_pairs: usize, left: usize| {
         let mut boxes = vec![Aabb::cube([0.0; 3], 0.5); 1000];
-        let mut motion = Motion::new(false, 1);
+        let mut motion = Motion::new(false);
         motion.found(1000, 0);
         let mut keep = |motion: &mut Motion| loop {
             shift(&mut boxes, 0.03);
