@@ -30,16 +30,21 @@ impl Wishes<'_> {
         Ok(())
     }
 
-    /// Returns these boxes grown: those of a pair are then no further apart than the margin on each axis.
+    /// Returns these boxes grown at their upper ends: those of a pair are then no further apart than the margin on
+    /// each axis.
     fn grown<'b>(&self, py: Python<'_>, given: &'b Boxes<'_>, which: &str) -> PyResult<Cow<'b, [Aabb]>> {
         let boxes = given.as_slice()?;
         if self.margin == 0.0 {
             return Ok(Cow::Borrowed(boxes));
         }
-        // Growing hides what is inverted. Rounded up.
+        // Growing hides what is inverted.
         Aabb::check(boxes, 0).map_err(|error| exception(py, &error, which))?;
-        let by = Aabb::from_f64([self.margin; 3], [self.margin; 3]).max;
-        Ok(Cow::Owned(py.detach(|| boxes.iter().map(|aabb| aabb.swept(by)).collect())))
+        // The sums are rounded down, and so to the highest 32-bit minimum that is not beyond them.
+        let grown = |aabb: &Aabb| {
+            let sums = aabb.max.map(|high| f64::from(high) + self.margin);
+            Aabb { max: Aabb::from_f64(sums, sums).min, ..*aabb }
+        };
+        Ok(Cow::Owned(py.detach(|| boxes.iter().map(grown).collect())))
     }
 
     /// Returns the corners of both members of a pair if rounding to 32 bits may have made pairs.
@@ -142,8 +147,8 @@ fn worlds<'py>(
 /// -----
 /// 32-bit floats of shape (n, 6) in C order are read in place; nothing may write to them meanwhile.
 /// Everything else is copied. 64-bit floats and integers give the pairs of 64-bit arithmetic: they are searched rounded
-/// outward to 32 bits, and pairs that only rounding has made are dropped. The interpreter's lock is released. Ctrl-C
-/// works before and after, not within.
+/// outward to 32 bits, and pairs that only rounding has made are dropped. ``margin`` is added in 64 bits for every
+/// dtype. The interpreter's lock is released. Ctrl-C works before and after, not within.
 ///
 /// Examples
 /// --------

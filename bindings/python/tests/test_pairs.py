@@ -189,6 +189,37 @@ def test_a_margin_finds_neighbours():
         sapwise.pairs(inverted, margin=0.25)
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_a_margin_is_not_rounded(dtype):
+    # A gap of 2. The sum of 16777216 and 1.5 is no 32-bit float: the next ones are 16777216 and 16777218.
+    a, b = [0, 0, 0, 16777216, 1, 1], [16777218, 0, 0, 16777220, 1, 1]
+    for boxes in (np.array([a, b], dtype), np.array([b, a], dtype)):
+        for margin, pairs in [(1.5, []), (1.9999, []), (2.0, [[0, 1]]), (2.5, [[0, 1]])]:
+            assert sapwise.pairs(boxes, margin=margin, limit=len(pairs)).tolist() == pairs
+            assert sapwise.pairs(boxes, margin=margin, worlds=[0, 0]).tolist() == pairs
+            assert len(sapwise.pairs_between(boxes[:1], boxes[1:], margin=margin)) == len(pairs)
+            assert len(sapwise.pairs_between(boxes[:1], boxes[1:].astype(np.float64), margin=margin)) == len(pairs)
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    # Where 32-bit floats are 2 apart.
+    arrays.arrays(np.float32, (12, 2, 3), elements=st.integers(2**23, 2**23 + 5).map(lambda half: 2.0 * half)),
+    st.floats(0, 10) | st.integers(0, 20).map(lambda halves: halves / 2),
+    st.booleans(),
+)
+def test_any_margin(corners, margin, wide):
+    boxes = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1).astype(float)
+    if wide:
+        boxes[:, 3:] += 0.25
+    low, high = boxes[:, None, :3], boxes[None, :, 3:] + margin
+    near = (low <= high).all(axis=2) & (low <= high).all(axis=2).T
+    known = np.argwhere(np.triu(near, 1))
+    assert np.array_equal(sapwise.pairs(boxes if wide else boxes.astype(np.float32), margin=margin), known)
+    if not wide:
+        assert np.array_equal(sapwise.pairs(boxes, margin=margin), known)
+
+
 def test_many_small_worlds():
     world = np.repeat(np.arange(500), 31)
     boxes = np.tile(cubes(31, seed=5), (500, 1))

@@ -89,8 +89,10 @@ fn grow(boxes: &mut [Aabb], margin: f64) -> Result<(), JsError> {
     if let Some((index, defect)) = boxes.iter().enumerate().find_map(|(k, b)| Some((k, b.defect()?))) {
         return Err(Error::InvalidBox { index, defect }.into());
     }
-    // Rounded up.
-    let by = Aabb::from_f64([margin; 3], [margin; 3]).max;
-    boxes.iter_mut().for_each(|aabb| *aabb = aabb.swept(by));
+    for aabb in boxes {
+        // The sums are rounded down, and so to the highest 32-bit minimum that is not beyond them.
+        let sums = aabb.max.map(|high| f64::from(high) + margin);
+        aabb.max = Aabb::from_f64(sums, sums).min;
+    }
     Ok(())
 }

@@ -47,6 +47,10 @@ test("margin and limit", () => {
   const apart = new Float32Array([0, 0, 0, 1, 1, 1, 1.5, 0, 0, 2, 1, 1]);
   assert.equal(findPairs(apart, { margin: 0.4 }).length, 0);
   assert.equal(findPairs(apart, { margin: 0.5 }).length, 2);
+  // The sum of 16777216 and 1.5 is no 32-bit float: the next ones are 16777216 and 16777218.
+  const far = new Float32Array([0, 0, 0, 16777216, 1, 1, 16777218, 0, 0, 16777220, 1, 1]);
+  assert.equal(findPairs(far, { margin: 1.5, limit: 0 }).length, 0);
+  assert.equal(findPairs(far, { margin: 2 }).length, 2);
   assert.equal(findPairs(two, { limit: 1 }).length, 2);
   assert.throws(() => findPairs(two, { limit: 0 }), /more pairs than the limit of 0/);
 });
