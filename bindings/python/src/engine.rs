@@ -14,6 +14,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// Fewest boxes for an estimate of how they lie. For fewer it costs more than it saves.
 const WORTH_AN_ESTIMATE: usize = 2500;
 
+/// Boxes from which on each call reads the free memory for its default limit. Fewer have at most 50 million pairs.
+const MANY: usize = 10_000;
+
 /// Largest call whose buffers are kept for the next: a few hundred megabytes.
 const MOST_BOXES_KEPT: usize = 2_000_000;
 const MOST_PAIRS_KEPT: usize = 16_000_000;
@@ -33,9 +36,6 @@ pub(crate) struct Search<'a> {
     /// Subtracted from the second member of each pair.
     pub(crate) from_second: u32,
 }
-
-/// Boxes from which on the free memory is read again for the default limit. Fewer have at most 50 million pairs.
-const MANY: usize = 10_000;
 
 /// What is searched.
 pub(crate) enum What<'a> {
@@ -153,10 +153,11 @@ impl Engine {
         let order = if search.places.is_some() { PairOrder::Any } else { search.order };
         let list = &mut self.pairs[usize::from(order == PairOrder::Canonical)];
         let mut pairs = list.take().unwrap_or_else(|| start::pairs(order, None));
-        let usual_limit = pairs.limit();
-        let limit = search.limit.or_else(|| if search.what.len() < MANY { usual_limit } else { most_pairs() });
-        // Pairs that only rounding has made do not count.
-        pairs.set_limit(if search.exactly.is_some() { usual_limit } else { limit });
+        let usual_limit = usual_limit(search.what.len(), &pairs);
+        let limit = search.limit.or(usual_limit);
+        // Pairs that only rounding has made do not count: memory alone limits those that are found.
+        let room = limit.zip(usual_limit).map(|(limit, usual)| limit.max(usual));
+        pairs.set_limit(if search.exactly.is_some() { room } else { limit });
         pairs.set_filter(search.filter);
         let found = self.run(search.what, &mut pairs);
         pairs.set_limit(usual_limit);
@@ -236,6 +237,14 @@ impl Engine {
     fn is_small(&self) -> bool {
         self.pairs.iter().flatten().map(Pairs::len).sum::<usize>() <= MOST_PAIRS_KEPT
     }
+}
+
+/// Returns the default limit on the pairs of so many boxes. Few boxes take that of the previous call, if it can't
+/// refuse them: to read the free memory would cost more than the search.
+fn usual_limit(boxes: usize, previous: &Pairs) -> Option<usize> {
+    let possible = boxes.saturating_mul(boxes) / 2;
+    let suffices = boxes < MANY && previous.limit().is_none_or(|limit| possible <= limit);
+    if suffices { previous.limit() } else { most_pairs() }
 }
 
 /// Returns whether most boxes that overlap on the best axis overlap: then nothing is faster than a sweep along it, and
