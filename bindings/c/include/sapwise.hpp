@@ -35,10 +35,13 @@ struct Body : sw_body {
 };
 
 template <class T> class Span {
+    // Of T, or of T without const. Not of a class derived from T, whose objects lie further apart.
+    template <class U> using Of = std::enable_if_t<std::is_convertible_v<U (*)[], T (*)[]>>;
+    template <class C> using Element = std::remove_pointer_t<decltype(std::declval<C &>().data())>;
 public:
     Span() = default;
-    Span(T *first, std::size_t size) : first_(first), size_(size) {}
-    template <class C, class = decltype(std::declval<C &>().data())> Span(C &&c) : Span(c.data(), c.size()) {}
+    template <class U, class = Of<U>> Span(U *first, std::size_t size) : first_(first), size_(size) {}
+    template <class C, class = Of<Element<C>>> Span(C &&c) : Span(c.data(), c.size()) {}
     T *data() const { return first_; }
     std::size_t size() const { return size_; }
     T *begin() const { return first_; }
@@ -58,7 +61,8 @@ struct Boxes {
     std::size_t size, stride;
     Boxes(const float *lows, const float *highs, std::size_t n, std::size_t bytes)
         : min(lows), max(highs), size(n), stride(bytes) {}
-    template <class C, class = decltype(std::declval<C &>().data())> Boxes(const C &c) : Boxes(Span<const Box>(c)) {}
+    template <class C, class = std::enable_if_t<std::is_convertible_v<const C &, Span<const Box>>>>
+    Boxes(const C &c) : Boxes(Span<const Box>(c)) {}
     Boxes(Span<const Box> boxes) : Boxes(boxes.size() ? boxes[0].bounds() : nullptr, nullptr, boxes.size(), 0) {}
 };
 // The points origin + t * direction, 0 <= t <= max.

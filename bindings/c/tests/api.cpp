@@ -77,6 +77,24 @@ struct Thing {
     float low[4], high[4];
 };
 
+// Arrays of a derived struct are refused: its objects lie further apart than the boxes or bodies in them.
+struct NamedBox : Box {
+    int name;
+};
+struct NamedBody : sapwise::Body {
+    int name;
+};
+template <class From, class To> constexpr bool becomes = std::is_convertible_v<From, To>;
+static_assert(!becomes<std::vector<NamedBox> &, sapwise::Span<Box>>);
+static_assert(!becomes<const std::vector<NamedBox> &, sapwise::Span<const Box>>);
+static_assert(!becomes<const std::vector<NamedBox> &, sapwise::Boxes>);
+static_assert(!becomes<const std::vector<NamedBody> &, sapwise::Span<const sapwise::Body>>);
+static_assert(!becomes<const std::vector<Handle> &, sapwise::Span<Handle>>);
+static_assert(!std::is_constructible_v<sapwise::Span<const Box>, const NamedBox *, std::size_t>);
+static_assert(becomes<std::vector<Box> &, sapwise::Span<Box>> && becomes<const std::vector<Box> &, sapwise::Boxes>);
+static_assert(becomes<sapwise::Span<Box>, sapwise::Span<const Box>> && becomes<std::array<Box, 2>, sapwise::Boxes>);
+static_assert(std::is_constructible_v<sapwise::Span<const Box>, Box *, std::size_t>);
+
 // The distances are compared with what the definition says, each box on its own.
 void query(const sapwise::Space &space, const std::map<Handle, Known> &known, const sapwise::Body *by) {
     const Box box = random_box();
