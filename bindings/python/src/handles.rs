@@ -2,15 +2,17 @@
 
 use crate::call;
 use crate::error::stale;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use sapwise::{Error, Handle, Space};
 
 /// Takes one handle or several.
 pub(crate) fn handles(given: &Bound<'_, PyAny>) -> PyResult<Vec<Handle>> {
     let py = given.py();
+    // Subclasses are converted, which refuses masked arrays.
+    let plain = given.get_type().is(py.get_type::<PyUntypedArray>());
     let array = match given.cast::<PyArray1<u64>>() {
-        Ok(array) if array.is_c_contiguous() && array.data().is_aligned() => array.clone(),
+        Ok(array) if plain && array.is_c_contiguous() && array.data().is_aligned() => array.clone(),
         _ => call(py, "sapwise._arrays", "handles", (given,))?.cast_into::<PyArray1<u64>>()?,
     };
     let array = array.try_readonly()?;
