@@ -26,15 +26,16 @@ export class Overlaps {
 
   /** Takes in what moved, and returns the pairs of meshes that began and ended to overlap. Call it in each frame. */
   update() {
-    const [handles, boxes] = [[], []];
+    const [moved, boxes] = [[], []];
     for (const [mesh, known] of this.#known) {
       const box = new Box3().setFromObject(mesh);
       if (box.equals(known.box)) continue;
-      known.box = box;
-      handles.push(known.handle);
+      moved.push(known);
       boxes.push(box);
     }
-    this.#space.set(BigUint64Array.from(handles), numbers(boxes));
+    // If one of the boxes is invalid, this throws and sets none.
+    this.#space.set(BigUint64Array.from(moved, ({ handle }) => handle), numbers(boxes));
+    moved.forEach((known, k) => (known.box = boxes[k]));
     this.#space.remove(BigUint64Array.from(this.#removed));
     this.#space.update();
     const events = { begun: this.#pairs(this.#space.begun()), ended: this.#pairs(this.#space.ended()) };

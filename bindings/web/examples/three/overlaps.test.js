@@ -42,3 +42,15 @@ test("meshes that move meet as their boxes do", () => {
     assert.deepEqual(overlaps.along(ray).map(({ name }) => name).sort(), met.sort());
   }
 });
+
+test("after a mesh without a valid place the others are where they are", () => {
+  const overlaps = new Overlaps();
+  const [a, b, c] = [0, 5, 10].map((x) => new Mesh(new BoxGeometry()).translateX(x));
+  [a, b, c].forEach((mesh) => overlaps.add(mesh));
+  overlaps.update();
+  b.position.x = 0.5;
+  c.position.x = NaN;
+  assert.throws(() => overlaps.update(), /not a number/);
+  c.position.x = 10;
+  assert.deepEqual(overlaps.update().begun, [[a, b]]);
+});
