@@ -1,6 +1,6 @@
 //! Arrays of a caller, and lists for it.
 
-use crate::{Failure, sw_status::*};
+use crate::{Failure, call, sw_status, sw_status::*};
 use sapwise::Handle;
 
 /// Borrows an array. NULL is an empty one.
@@ -41,6 +41,16 @@ pub(crate) unsafe fn put<T>(to: *mut T, value: T, what: &str) -> Result<(), Fail
     // SAFETY: of the caller.
     unsafe { to.write_unaligned(value) };
     Ok(())
+}
+
+/// Runs a call that writes a handle if it succeeds. After every failure the handle is 0, also if the object is in use.
+///
+/// # Safety
+/// As [`put`].
+pub(crate) unsafe fn with_handle(handle: *mut u64, run: impl FnOnce() -> sw_status) -> sw_status {
+    // SAFETY: of the caller.
+    let unset = call(|| unsafe { put(handle, 0, "handle") });
+    if unset == SW_OK { run() } else { unset }
 }
 
 /// Converts the handle of a caller.

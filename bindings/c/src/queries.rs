@@ -1,5 +1,6 @@
 //! Queries of a space.
 
+use crate::arrays::with_handle;
 use crate::boxes::corner;
 use crate::{Boxes, Failure, call, one, put, sw_body, sw_space, sw_status};
 use sapwise::{Handle, Ray, View};
@@ -166,10 +167,12 @@ pub unsafe extern "C-unwind" fn sw_space_first_hit(
 ) -> sw_status {
     // SAFETY: of the caller.
     unsafe {
-        query(space, by, |view| {
-            let first = view.first_hit(&ray(origin, direction, max)?)?;
-            put(handle, first.map_or(0, |(handle, _)| handle.to_bits()), "handle")?;
-            put(t, first.map_or(max, |(_, t)| t), "t")
+        with_handle(handle, || {
+            query(space, by, |view| {
+                let first = view.first_hit(&ray(origin, direction, max)?)?;
+                put(t, first.map_or(max, |(_, t)| t), "t")?;
+                put(handle, first.map_or(0, |(handle, _)| handle.to_bits()), "handle")
+            })
         })
     }
 }

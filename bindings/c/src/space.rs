@@ -1,6 +1,6 @@
 //! Bodies with handles.
 
-use crate::arrays::{handle, handles};
+use crate::arrays::{handle, handles, with_handle};
 use crate::status::stale;
 use crate::{
     Boxes, Failure, Guarded, SW_MEASURE, call, check, flat, guarded, one, put, save, slice, sw_body, sw_options,
@@ -152,10 +152,11 @@ pub unsafe extern "C-unwind" fn sw_space_insert(
 ) -> sw_status {
     // SAFETY: of the caller.
     unsafe {
-        sw_space::change(space, |space| {
-            put(handle, 0, "handle")?;
-            let new = space.insert(*one(bounds, "bounds")?, sw_body::or_default(body)?)?;
-            put(handle, new.to_bits(), "handle")
+        with_handle(handle, || {
+            sw_space::change(space, |space| {
+                let new = space.insert(*one(bounds, "bounds")?, sw_body::or_default(body)?)?;
+                put(handle, new.to_bits(), "handle")
+            })
         })
     }
 }

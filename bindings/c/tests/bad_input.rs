@@ -44,6 +44,13 @@ fn null_is_a_status() {
         fails(sw_space_insert(space, CUBE.as_ptr(), null(), null_mut()), SW_NULL, "handle is NULL");
         fails(sw_space_insert(space, null(), null(), &raw mut out), SW_NULL, "bounds is NULL");
         assert_eq!((out, sw_space_len(space)), (0, 3));
+        out = 7;
+        fails(sw_space_insert(null_mut(), CUBE.as_ptr(), null(), &raw mut out), SW_NULL, "space is NULL");
+        let (from, along) = ([-1.0_f32, 0.5, 0.5], [1.0_f32, 0.0, 0.0]);
+        let (from, along, mut hit) = (from.as_ptr(), along.as_ptr(), 7);
+        let without_t = sw_space_first_hit(space, from, along, 9.0, null(), &raw mut hit, null_mut());
+        fails(without_t, SW_NULL, "t is NULL");
+        assert_eq!((out, hit), (0, 0));
         assert!(sw_space_pairs(null(), &raw mut count).is_null() && count == 0);
         assert!(sw_space_pairs(space, null_mut()).is_null());
         fails(sw_last_status(), SW_NULL, "count is NULL");
@@ -126,13 +133,16 @@ fn invalid_boxes_bodies_and_rays_are_named() {
             assert_eq!(sw_space_insert_bodies(space, first.cast(), 2, 0, null(), bodies.as_ptr(), out), status);
         }
         let (origin, zero) = ([f32::INFINITY; 3], [0.0; 3]);
-        let hit = |origin: &[f32; 3], direction: &[f32; 3]| {
+        let hit = |space: *const sw_space, origin: &[f32; 3], direction: &[f32; 3]| {
             let (mut handle, mut t) = (7, 7.0);
             let (origin, direction) = (origin.as_ptr(), direction.as_ptr());
-            sw_space_first_hit(space, origin, direction, 1.0, null(), &raw mut handle, &raw mut t)
+            let status = sw_space_first_hit(space, origin, direction, 1.0, null(), &raw mut handle, &raw mut t);
+            assert_eq!(handle, 0);
+            status
         };
-        fails(hit(&origin, &zero), SW_INVALID_RAY, "not finite");
-        fails(hit(&zero, &zero), SW_INVALID_RAY, "direction zero");
+        fails(hit(space, &origin, &zero), SW_INVALID_RAY, "not finite");
+        fails(hit(space, &zero, &zero), SW_INVALID_RAY, "direction zero");
+        fails(hit(null(), &zero, &zero), SW_NULL, "space is NULL");
         assert_eq!([sw_space_len(space), sw_space_free(space) as usize], [3, 0]);
     }
 }
@@ -166,13 +176,14 @@ fn stale_handles_change_nothing() {
 /// Everything that may not happen in a callback, and some that may.
 unsafe extern "C-unwind" fn calls_back(user: *mut c_void, handle: u64) -> c_int {
     let space: *mut sw_space = user.cast();
-    let mut out = 0;
+    let mut out = 7;
     // SAFETY: `user` is the space of the query.
     unsafe {
         fails(sw_space_update(space), SW_BUSY, "not in a callback");
         fails(sw_space_set(space, handle, CUBE.as_ptr()), SW_BUSY, "query");
         fails(sw_space_remove(space, handle), SW_BUSY, "query");
         fails(sw_space_insert(space, CUBE.as_ptr(), null(), &raw mut out), SW_BUSY, "query");
+        assert_eq!(out, 0);
         fails(sw_space_assign(space, space), SW_BUSY, "query");
         fails(sw_space_free(space), SW_BUSY, "query");
         let mut bounds = [0.0; 6];
