@@ -169,8 +169,8 @@ impl Adaptive {
     }
 
     /// Writes what was learned to the cache, for the next start on this machine: call it at the end of a session.
-    /// Returns `false` and writes nothing if the tuning of this machine has not arrived yet or could not be
-    /// predicted.
+    /// Returns `false` and writes nothing if the tuning of this machine has not arrived yet, could not be predicted,
+    /// or follows from a measurement with an implausible value, which the [remarks](Setup::remarks) name.
     ///
     /// # Errors
     /// When there is no cache or its file can't be written.

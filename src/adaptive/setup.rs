@@ -77,8 +77,8 @@ impl std::error::Error for SaveError {
     }
 }
 
-/// Writes a tuning to the cache.
-pub(super) type Save = Arc<dyn Fn(&Tuning) -> Result<(), SaveError> + Send + Sync>;
+/// Writes a tuning to the cache. `false`: it must not be kept.
+pub(super) type Save = Arc<dyn Fn(&Tuning) -> Result<bool, SaveError> + Send + Sync>;
 
 /// What an [`Adaptive`](super::Adaptive) keeps of its start.
 #[derive(Default)]
@@ -112,10 +112,10 @@ impl Start {
         Self { setup, save, background: None }
     }
 
-    /// Saves what was learned. `false` when the tuning has not arrived or none could be predicted.
+    /// Saves what was learned. `false` when the tuning has not arrived, could not be predicted, or must not be kept.
     pub(super) fn save(&self, learned: impl FnOnce() -> Tuning) -> Result<bool, SaveError> {
         match (&self.save, self.setup.origin) {
-            (Some(save), _) => save(&learned()).map(|()| true),
+            (Some(save), _) => save(&learned()),
             (None, Origin::Awaited | Origin::Usual) => Ok(false),
             (None, _) => Err(SaveError::NoCache),
         }

@@ -401,7 +401,7 @@ sw_status sw_space_get(const sw_space *space, uint64_t handle, float bounds[6], 
 sw_status sw_space_handles(const sw_space *space, uint64_t *handles, size_t n);
 
 // Saves the costs that the space has learned, for the next start on this machine. SW_CACHE if there is no cache, it
-// can't be written, or the measurement has not ended.
+// can't be written, the measurement has not ended, or it had an implausible value.
 sw_status sw_space_save(const sw_space *space);
 
 // Writes which algorithm ran last and why, where the costs came from, and what went wrong at the start: a text for

@@ -83,7 +83,7 @@ fn parse(name: &str, registry: &Registry) -> Result<AlgorithmId, Failure> {
 pub(crate) fn save(search: &Adaptive) -> Result<(), Failure> {
     let why = match search.save() {
         Ok(true) => return Ok(()),
-        Ok(false) => "the costs of this machine are not known yet; save after the measurement".to_owned(),
+        Ok(false) => "there are no costs to keep: sw_space_describe and sw_search_describe have the reason".to_owned(),
         Err(SaveError::NoCache) => "there is no cache; set SW_MEASURE or cache_folder in sw_options".to_owned(),
         Err(error) => std::error::Error::source(&error).map_or(error.to_string(), |why| format!("{error}: {why}")),
     };

@@ -404,7 +404,7 @@ pub unsafe extern "C-unwind" fn sw_space_handles(space: *const sw_space, handles
 }
 
 /// Saves the costs that the space has learned, for the next start on this machine. SW_CACHE if there is no cache, it
-/// can't be written, or the measurement has not ended.
+/// can't be written, the measurement has not ended, or it had an implausible value.
 #[unsafe(no_mangle)]
 pub unsafe extern "C-unwind" fn sw_space_save(space: *const sw_space) -> sw_status {
     // SAFETY: of the caller.

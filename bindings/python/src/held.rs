@@ -192,7 +192,7 @@ macro_rules! learning_methods {
             /// Returns
             /// -------
             /// bool
-            ///     False if there is nothing to keep yet.
+            ///     False if there is nothing to keep: the measurement has not ended, or ``setup["remarks"]`` say why.
             ///
             /// Raises
             /// ------

@@ -86,23 +86,35 @@ fn usual_registry() -> Registry {
 
 /// Finds the tuning of this machine and makes its algorithms.
 fn arrive(options: &StartOptions, registry: &Registry, began: Instant, stop: Arc<AtomicBool>) -> Arrival {
+    let mut remarks = Vec::new();
+    let found = find(options, registry, &stop, &mut remarks);
+    let mut arrival = arrival(found, registry, remarks);
+    arrival.setup.seconds = began.elapsed().as_secs_f64();
+    arrival
+}
+
+/// Makes the algorithms of a tuning that was found.
+fn arrival(found: Option<Found>, registry: &Registry, remarks: Vec<String>) -> Arrival {
     let mut setup = Setup::default();
-    setup.origin = Origin::Usual;
+    (setup.origin, setup.remarks) = (Origin::Usual, remarks);
     let mut arrival = Arrival { setup, save: None, tuning: None };
-    if let Some(found) = find(options, registry, &stop, &mut arrival.setup.remarks) {
-        let Found { tuning, origin, measured, file } = found;
+    if let Some(Found { tuning, origin, measured, file, sound }) = found {
         let tuning = tuning.for_running();
         let mut made = Instances::of(&tuning, registry);
         if let Some(e) = made.failure() {
             arrival.setup.remarks.push(format!("no algorithm of the predicted tuning can be made: {e:#}"));
         } else {
             arrival.setup.origin = origin;
-            arrival.setup.file = file.as_ref().map(|file| file.path().to_owned());
-            arrival.save = file.map(|file| Arc::new(move |learned: &Tuning| file.write(learned, measured)) as _);
+            arrival.setup.file = file.as_ref().filter(|_| sound).map(|file| file.path().to_owned());
+            arrival.save = file.map(|file| {
+                let write = move |learned: &Tuning| {
+                    if sound { file.write(learned, measured).map(|()| true) } else { Ok(false) }
+                };
+                Arc::new(write) as _
+            });
             arrival.tuning = Some((tuning, made));
         }
     }
-    arrival.setup.seconds = began.elapsed().as_secs_f64();
     arrival
 }
 
@@ -111,8 +123,10 @@ struct Found {
     tuning: Tuning,
     origin: Origin,
     measured: SystemTime,
-    /// Where it is kept, if it may be.
+    /// Where it is kept, if there is a cache.
     file: Option<CacheFile>,
+    /// Whether it may be kept: it follows from no impossible value.
+    sound: bool,
 }
 
 /// Reads the cache, else measures and predicts. An old tuning is used if that brings nothing better.
@@ -128,7 +142,10 @@ fn find(
         remarks.push(why);
         None
     });
-    let kept = kept.map(|(tuning, measured)| Found { tuning, origin: Origin::Cached, measured, file: file.clone() });
+    let kept = kept.map(|(tuning, measured)| {
+        let (origin, file) = (Origin::Cached, file.clone());
+        Found { tuning, origin, measured, file, sound: true }
+    });
     // A clock that was set back makes nothing old.
     let age = |kept: &Found| kept.measured.elapsed().unwrap_or_default();
     let Some(limit) = options.measure else {
@@ -148,12 +165,11 @@ fn find(
     let Some((tuning, sound)) = predicted.filter(|(_, sound)| *sound || kept.is_none()) else { return kept };
     let measured = SystemTime::now();
     // What follows from an impossible value is used, but not kept.
-    let file = file.filter(|_| sound);
-    if let Some(Err(e)) = file.as_ref().map(|file| file.write(&tuning, measured)) {
+    if let Some(Err(e)) = file.as_ref().filter(|_| sound).map(|file| file.write(&tuning, measured)) {
         let cause = std::error::Error::source(&e).map_or(String::new(), |cause| format!(": {cause}"));
         remarks.push(format!("{e}{cause}"));
     }
-    Some(Found { tuning, origin: Origin::Probed, measured, file })
+    Some(Found { tuning, origin: Origin::Probed, measured, file, sound })
 }
 
 /// Predicts without the values and the GPUs that are impossible, and returns whether there was none of these.
@@ -212,6 +228,23 @@ mod tests {
     #[test]
     fn no_thread_is_pinned_unless_asked() {
         assert_eq!(usual_registry().helpers(), "free");
+    }
+
+    #[test]
+    fn a_tuning_from_an_impossible_value_is_not_saved() {
+        let (registry, folder) = (Registry::with_cores(1), tempfile::tempdir().unwrap());
+        for sound in [false, true] {
+            let file = CacheFile::new(folder.path(), &registry);
+            let (tuning, path) = (Tuning::usual(&registry), file.path().to_owned());
+            let file = Some(file);
+            let found = Found { tuning, origin: Origin::Probed, measured: SystemTime::now(), file, sound };
+            let Arrival { setup, save, tuning } = arrival(Some(found), &registry, Vec::new());
+            let (tuning, made) = tuning.unwrap();
+            let mut adaptive = Adaptive::with(tuning, made);
+            adaptive.set_start(Start { setup, save, background: None });
+            assert_eq!((adaptive.save().unwrap(), path.exists()), (sound, sound));
+            assert_eq!(adaptive.setup().file, sound.then_some(path));
+        }
     }
 
     #[test]
