@@ -173,7 +173,9 @@ impl PyBroadPhase {
     /// Notes
     /// -----
     /// After an error nothing has begun or ended, and the next frame is compared with the last one that
-    /// succeeded. ``pairs`` says which input is copied. Ctrl-C works before and after a frame, not within.
+    /// succeeded. ``pairs`` says which input is copied. Ctrl-C works before and after a frame, not within. A frame
+    /// that was searched counts even if ``KeyboardInterrupt`` follows: ``begun`` and ``ended`` hold its changes, and
+    /// the next frame is compared with it.
     #[pyo3(signature = (boxes, upper=None, *, ids=None))]
     fn find<'py>(
         &self,

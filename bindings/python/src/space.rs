@@ -271,6 +271,11 @@ impl PySpace {
     /// TooManyPairsError, MemoryError, SapwiseError
     ///     More pairs than ``limit``, no memory, or no algorithm can run. The next update compares with the last one
     ///     that succeeded.
+    ///
+    /// Notes
+    /// -----
+    /// Ctrl-C works before and after an update, not within. An update that was done counts even if
+    /// ``KeyboardInterrupt`` follows: ``pairs``, ``begun`` and ``ended`` hold its pairs.
     fn update(&self, py: Python<'_>) -> PyResult<()> {
         py.check_signals()?;
         self.change(py, &[], &[], Space::update)?;
