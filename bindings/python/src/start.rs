@@ -85,22 +85,41 @@ pub(crate) fn registry(threads: Option<u32>) -> Registry {
     with_gpus(threads, false)
 }
 
-/// Adds the algorithms on GPUs, and on software adapters too if `software`. They are found once in each process.
+/// Adds the algorithms on GPUs, and on software adapters too if `software`.
 #[cfg(feature = "gpu")]
 fn with_gpus(threads: Option<u32>, software: bool) -> Registry {
-    static FOUND: std::sync::Mutex<Option<(u32, sapwise_gpu::Gpus)>> = std::sync::Mutex::new(None);
     let mut registry = on_cpu(threads);
-    let mut found = FOUND.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-    let pid = std::process::id();
-    if !matches!(&*found, Some((of, _)) if *of == pid) {
-        // After a fork. Dropping them would wait for a driver that is not in this process.
-        std::mem::forget(found.replace((pid, sapwise_gpu::Gpus::find())));
-    }
     let wanted = |kind| software || kind != sapwise_gpu::GpuKind::Software;
-    if let Some((_, gpus)) = &*found {
-        sapwise_gpu::add_to(&mut registry, &gpus.choose(|gpu| wanted(gpu.kind)));
-    }
+    sapwise_gpu::add_to(&mut registry, &gpus().choose(|gpu| wanted(gpu.kind)));
     registry
+}
+
+/// Returns the GPUs, which are found once in each process.
+#[cfg(feature = "gpu")]
+fn gpus() -> sapwise_gpu::Gpus {
+    use sapwise_gpu::Gpus;
+    use std::sync::{Mutex, PoisonError};
+    /// With the process that found them. Locked only by a thread with the interpreter's lock, and for an instant: no
+    /// fork finds it locked.
+    static FOUND: Mutex<Option<(u32, Gpus)>> = Mutex::new(None);
+    let pid = std::process::id();
+    let found = || FOUND.lock().unwrap_or_else(PoisonError::into_inner);
+    let known = |of: &Option<(u32, Gpus)>| of.as_ref().filter(|(of, _)| *of == pid).map(|(_, gpus)| gpus.clone());
+    if let Some(gpus) = Python::try_attach(|_| known(&found())).flatten() {
+        return gpus;
+    }
+    let new = Gpus::find();
+    let first = Python::try_attach(|_| {
+        let mut found = found();
+        // Another thread may have found them meanwhile.
+        known(&found).unwrap_or_else(|| {
+            // After a fork. Dropping them would wait for a driver that is not in this process.
+            std::mem::forget(found.replace((pid, new.clone())));
+            new.clone()
+        })
+    });
+    // The interpreter may be shutting down.
+    first.unwrap_or(new)
 }
 
 #[cfg(not(feature = "gpu"))]
