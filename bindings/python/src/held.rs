@@ -29,18 +29,22 @@ pub(crate) struct Held<T: Searcher> {
 }
 
 /// Locked only by a thread with the interpreter's lock, and for an instant: no fork finds it locked.
-struct State<T> {
+struct State<T: Searcher> {
     /// The process that made the searcher. Its threads are not in a forked one.
     pid: u32,
     /// `None` once it is closed. Only a thread without the interpreter's lock locks it.
     searcher: Option<Arc<RwLock<T>>>,
 }
 
-impl<T> Drop for State<T> {
+impl<T: Searcher> Drop for State<T> {
     fn drop(&mut self) {
+        let searcher = self.searcher.take();
         if self.pid != std::process::id() {
             // Dropping it would wait for threads that are not in this process.
-            std::mem::forget(self.searcher.take());
+            std::mem::forget(searcher);
+        } else if searcher.is_some() {
+            // It waits until its measurement has ended. While the interpreter shuts down, it is dropped all the same.
+            Python::try_attach(|py| py.detach(|| drop(searcher)));
         }
     }
 }
@@ -90,13 +94,14 @@ impl<T: Searcher> Held<T> {
     /// Runs `what` on the searcher, without the interpreter's lock, while nothing else uses it.
     pub(crate) fn write<R: Send>(&self, py: Python<'_>, what: impl FnOnce(&mut T) -> R + Send) -> PyResult<R> {
         let shared = self.shared(py)?;
-        Ok(py.detach(|| what(&mut shared.write().unwrap_or_else(PoisonError::into_inner))))
+        // If another thread closes it meanwhile, it is dropped here.
+        Ok(py.detach(move || what(&mut shared.write().unwrap_or_else(PoisonError::into_inner))))
     }
 
     /// Runs `what` on the searcher, without the interpreter's lock, while nothing changes it.
     pub(crate) fn read<R: Send>(&self, py: Python<'_>, what: impl FnOnce(&T) -> R + Send) -> PyResult<R> {
         let shared = self.shared(py)?;
-        Ok(py.detach(|| what(&shared.read().unwrap_or_else(PoisonError::into_inner))))
+        Ok(py.detach(move || what(&shared.read().unwrap_or_else(PoisonError::into_inner))))
     }
 
     pub(crate) fn last_decision(&self, py: Python<'_>) -> PyResult<Option<PyDecision>> {

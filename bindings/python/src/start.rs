@@ -215,6 +215,10 @@ pub(crate) fn adaptive(py: Python<'_>, start: &Start) -> PyResult<Adaptive> {
     }
     py.check_signals()?;
     let made = py.detach(|| start.adaptive());
-    py.check_signals()?;
+    if let Err(interrupted) = py.check_signals() {
+        // It waits until its measurement has ended.
+        py.detach(|| drop(made));
+        return Err(interrupted);
+    }
     made.map_err(|error| exception(py, &error, ""))
 }

@@ -50,6 +50,26 @@ thread.join(); print(steps)
     assert int(run(HEAD + script)) > 20
 
 
+def test_python_runs_while_measurements_of_unclosed_objects_end():
+    script = """
+steps, done = 0, threading.Event()
+def work():
+    global steps
+    while not done.is_set(): steps += 1; time.sleep(0.001)
+thread = threading.Thread(target=work); thread.start()
+for _ in range(20):
+    measuring = [sapwise.BroadPhase(cache=False) for _ in range(5)] + [sapwise.Space(cache=False) for _ in range(5)]
+    time.sleep(0.1)
+    before, began = steps, time.monotonic()
+    del measuring
+    during, seconds = steps - before, time.monotonic() - began
+    if seconds > 0.1: break
+done.set(); thread.join()
+print('fine' if during > 5 or seconds < 0.1 else (during, seconds))
+"""
+    assert run(HEAD + script).strip() == "fine"
+
+
 def test_it_is_closed_while_a_frame_runs():
     script = """
 boxes = cubes(300_000, seed=1); known = len(sapwise.pairs(boxes))
