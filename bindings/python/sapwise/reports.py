@@ -102,7 +102,7 @@ def _rows(path, among_others=False):
         raise InputError(f"{path} is {schema}, and only report/3 can be read; measure again with `sapwise probe --out`")
     try:
         return list(_timings(path, report))
-    except (KeyError, TypeError, IndexError, AttributeError) as why:
+    except (KeyError, TypeError, ValueError, OverflowError, IndexError, AttributeError) as why:
         raise InputError(f"{path} lacks what {schema} must have ({why!r}); `sapwise check {path}` says what") from why
 
 
@@ -110,7 +110,7 @@ def _timings(path, report):
     hardware, machine = report["hardware"], report["hardware"]["machine"]
     parameters = {p["name"]: np.nan if p["value"] is None else float(p["value"]) for p in hardware["parameters"]}
     revisions = {a["id"]: a["revision"] for a in report["algorithms"]}
-    of_file = {
+    of_file = _typed({
         "file": f"{path.parent.name}/{path.name}",
         "host": _host(machine, parameters),
         "cpu": machine["cpu"],
@@ -120,10 +120,10 @@ def _timings(path, report):
         "label": report["label"],
         "date": report["provenance"]["date"],
         "gpus": ", ".join(of["gpu"]["name"] for of in hardware.get("gpus", [])),
-    }
+    })
     for point in report["points"]:
         load = point["load"]
-        of_point = {
+        of_point = _typed({
             "scenario": point["scenario"],
             "objects": load["objects"],
             "pairs": point["pairs"],
@@ -131,15 +131,13 @@ def _timings(path, report):
             "strip_candidates": load["strip_candidates"],
             "moved": load["moved"],
             "moved_share": load["moved_share"],
-            "foreign_load": _known(point["foreign_load"]),
-        }
+            "foreign_load": point["foreign_load"],
+        })
         for timing in point["timings"]:
             name = timing["algorithm"]
             method, _, backend = name.partition("@")
             low, median, high = _quartiles(timing["samples_ns"])
-            yield {
-                **of_file,
-                **of_point,
+            of_timing = _typed({
                 "algorithm": name,
                 "method": method,
                 "backend": backend,
@@ -149,13 +147,24 @@ def _timings(path, report):
                 "q25_ns": low,
                 "q75_ns": high,
                 "samples": len(timing["samples_ns"]),
-                "error": timing.get("error") or "",
-                **parameters,
-            }
+                "error": timing.get("error"),
+            })
+            yield {**of_file, **of_point, **of_timing, **parameters}
 
 
-def _known(value):
-    return np.nan if value is None else value
+def _typed(row):
+    """Return a row with values of the types of its columns. Raises TypeError, ValueError or OverflowError."""
+    return {name: _value(name, value) for name, value in row.items()}
+
+
+def _value(name, value):
+    if name in _COUNTS:
+        return np.int64(int(value))
+    if name not in _TEXT:
+        return np.nan if value is None else float(value)
+    if not isinstance(value, (str, type(None))):
+        raise TypeError(f"{name} is {value!r}, not a text")
+    return value or ""
 
 
 def _host(machine, parameters):

@@ -105,6 +105,37 @@ def test_files_that_are_no_reports(tmp_path, text, why):
     assert "file.json" in str(error.value)
 
 
+@pytest.mark.parametrize(
+    "place, wrong",
+    [
+        ("points 0 timings 0 algorithm", "bvh@cpuX"),
+        ("points 0 timings 0 algorithm", 7),
+        ("points 0 timings 0 samples_ns 0", "fast"),
+        ("points 0 load objects", "many"),
+        ("points 0 load objects", 1e30),
+        ("points 0 load moved", {}),
+        ("points 0 pairs", None),
+        ("points 0 foreign_load", [1]),
+        ("points 0 scenario", []),
+        ("algorithms 0 revision", "new"),
+        ("hardware parameters 0 value", "big"),
+        ("hardware machine cpu", 5),
+    ],
+)
+def test_values_of_another_type_name_the_file(tmp_path, place, wrong):
+    report = json.loads(ONE.read_text(encoding="utf-8"))
+    report["points"] = report["points"][:1]
+    *outer, last = [int(key) if key.isdigit() else key for key in place.split()]
+    of = report
+    for key in outer:
+        of = of[key]
+    of[last] = wrong
+    path = tmp_path / "file.json"
+    path.write_text(json.dumps(report), encoding="utf-8")
+    with pytest.raises(sapwise.InputError, match="file.json lacks"):
+        sapwise.read_report(path)
+
+
 def test_folders(tmp_path):
     with pytest.raises(sapwise.InputError, match="holds no report"):
         sapwise.read_reports(tmp_path)
