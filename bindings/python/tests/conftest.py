@@ -11,14 +11,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+#: The variable that moves the user's cache folder.
+CACHE = {"darwin": "HOME", "win32": "LOCALAPPDATA"}.get(sys.platform, "XDG_CACHE_HOME")
 # Before the first use: no test reads or writes the cache of the user.
 if "SAPWISE_TESTS" not in os.environ:
     # What a test starts in a process of its own shares the folder, and a fork leaves it to its parent.
     FOLDER, OWNER = tempfile.mkdtemp(prefix="sapwise-tests-"), os.getpid()
-    os.environ["XDG_CACHE_HOME"] = os.environ["SAPWISE_TESTS"] = FOLDER
+    os.environ[CACHE] = os.environ["SAPWISE_TESTS"] = FOLDER
     atexit.register(lambda: os.getpid() == OWNER and shutil.rmtree(FOLDER, ignore_errors=True))
 
 ROOT = Path(__file__).resolve().parents[3]
+#: The folder of this file, for scripts that import it.
+HERE = str(Path(__file__).resolve().parent)
+
+#: The marks of tests for what not every system has.
+forks = pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
+limited_by_memory = pytest.mark.skipif(sys.platform != "linux", reason="only on Linux free memory limits the pairs")
 
 
 def naive(boxes, others=None):

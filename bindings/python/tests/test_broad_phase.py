@@ -162,7 +162,7 @@ def test_it_saves_when_the_block_ends(tmp_path):
             broad_phase.find(boxes)
     assert broad_phase.closed
     kept = [f for f in tmp_path.iterdir() if f.suffix == ".json"]
-    assert len(kept) == 1 and json.loads(kept[0].read_text())["schema"].startswith("tuning/")
+    assert len(kept) == 1 and json.loads(kept[0].read_text(encoding="utf-8"))["schema"].startswith("tuning/")
     again = sapwise.BroadPhase(cache=str(tmp_path), measure=False, background=False)
     assert again.setup["origin"] == "cached" and again.setup["file"] == str(kept[0])
     assert again.tuning.source == "learned" and again.save()

@@ -5,7 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
-from conftest import cubes, naive
+from conftest import cubes, limited_by_memory, naive
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
@@ -260,6 +260,7 @@ def test_too_many_pairs_are_an_exception():
     assert len(sapwise.pairs(np.zeros((2001, 6), np.float32))) == 2001 * 1000
 
 
+@limited_by_memory
 def test_a_crowd_whose_pairs_fill_no_memory():
     # 2e11 pairs, 1.6 TB.
     with pytest.raises((sapwise.TooManyPairsError, MemoryError)):

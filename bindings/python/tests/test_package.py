@@ -9,7 +9,7 @@ import sys
 from importlib import resources
 
 import pytest
-from conftest import ROOT, run
+from conftest import CACHE, ROOT, run
 
 import sapwise
 
@@ -41,21 +41,21 @@ def test_the_index_in_the_documents_is_that_of_the_docstrings():
     specification = importlib.util.spec_from_file_location("index", ROOT / "tools/python_index.py")
     module = importlib.util.module_from_spec(specification)
     specification.loader.exec_module(module)
-    document = (ROOT / "docs/python.md").read_text()
+    document = (ROOT / "docs/python.md").read_text(encoding="utf-8")
     assert module.index() in document, "write it again: tools/python.sh index"
     for name in PUBLIC:
         assert f"`{name}`" in document
 
 
 def test_the_code_of_the_guide_runs_from_top_to_bottom(tmp_path):
-    guide = (ROOT / "docs/python.md").read_text()
+    guide = (ROOT / "docs/python.md").read_text(encoding="utf-8")
     code = "\n".join(re.findall(r"```python\n(.*?)```", guide, re.DOTALL))
     # Takes a minute, and needs the command.
     probe = "sapwise.probe_report"
     assert probe in code
     lines = [line for line in code.splitlines() if not line.startswith(probe)]
     ends = "print(begun.tolist(), len(ended), len(pairs), len(hits), len(handles), tuning.fields[0][0])"
-    printed = run("\n".join([*lines, ends]), XDG_CACHE_HOME=str(tmp_path))
+    printed = run("\n".join([*lines, ends]), **{CACHE: str(tmp_path)})
     assert printed.splitlines()[-1] == "[] 0 0 2 2 0"
 
 
@@ -68,5 +68,5 @@ def test_nothing_heavy_comes_with_the_import():
 
 
 def test_the_version_is_that_of_the_library():
-    manifest = (ROOT / "Cargo.toml").read_text()
+    manifest = (ROOT / "Cargo.toml").read_text(encoding="utf-8")
     assert f'version = "{sapwise.__version__}"' in manifest

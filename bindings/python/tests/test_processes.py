@@ -1,10 +1,9 @@
 """Threads, forks and Ctrl-C. Each in a process of its own, so that a deadlock fails instead of lasting."""
 
-import os
 import sys
 
 import pytest
-from conftest import run
+from conftest import HERE, forks, run
 
 HEAD = """
 import os, signal, sys, threading, time
@@ -13,7 +12,7 @@ sys.path.insert(0, %r)
 from conftest import cubes, naive
 # Python takes no part in signals that its parent ignores, as that of a job in the background does.
 signal.signal(signal.SIGINT, signal.default_int_handler)
-""" % __file__.rsplit("/", 1)[0]
+""" % HERE
 
 
 def test_many_threads_at_once_get_their_own_answers():
@@ -109,7 +108,7 @@ stop.set(); thread.join(); print(answers)
     assert run(HEAD + script).strip() == "60"
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
+@forks
 def test_threads_that_meet_a_space_of_the_parent_at_once_make_one_of_it():
     script = """
 import warnings; warnings.simplefilter('ignore')
@@ -209,7 +208,7 @@ broad_phase = sapwise.BroadPhase(cache=False, measure=False)
 broad_phase.find(boxes[:100])
 raised = []
 for find in (broad_phase.find, sapwise.pairs):
-    timer = threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGINT)); timer.start()
+    timer = threading.Timer(0.01, signal.raise_signal, (signal.SIGINT,)); timer.start()
     try:
         while True: find(boxes)
     except KeyboardInterrupt: raised.append(find.__name__)
@@ -223,13 +222,13 @@ print(raised)
 def test_ctrl_c_ends_a_measurement(tmp_path):
     script = """
 for what in ('predict', 'probe'):
-    threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
+    threading.Timer(0.3, signal.raise_signal, (signal.SIGINT,)).start()
     began = time.monotonic()
     try:
         if what == 'predict': sapwise.predict(cache=False, seconds=20.0)
         else: sapwise.probe(quick=False)
-        print('not interrupted')
-    except KeyboardInterrupt: print(what, time.monotonic() - began < 5)
+        print('not interrupted', flush=True)
+    except KeyboardInterrupt: print(what, time.monotonic() - began < 5, flush=True)
 os._exit(0)
 """
     assert run(HEAD + script).split("\n")[:2] == ["predict True", "probe True"]

@@ -28,7 +28,7 @@ def rows(table):
 
 
 def test_a_row_for_each_timing_with_the_figures_of_the_file():
-    report = json.loads(ONE.read_text())
+    report = json.loads(ONE.read_text(encoding="utf-8"))
     found = rows(sapwise.read_report(ONE))
     timings = [(point, timing) for point in report["points"] for timing in point["timings"]]
     assert len(found) == len(timings) > 1000
@@ -53,15 +53,15 @@ def test_a_row_for_each_timing_with_the_figures_of_the_file():
 
 def test_all_reports_and_their_hosts():
     table = sapwise.read_reports(DATASETS)
-    files = [f for f in sorted(DATASETS.rglob("*.json")) if json.loads(f.read_text())["points"]]
+    files = [f for f in sorted(DATASETS.rglob("*.json")) if json.loads(f.read_text(encoding="utf-8"))["points"]]
     assert len(np.unique(table["file"].astype(str))) == len(files)
     # One CPU model and one clock of the hypervisor are one host.
     known = set()
-    for hardware in (json.loads(f.read_text())["hardware"] for f in files):
+    for hardware in (json.loads(f.read_text(encoding="utf-8"))["hardware"] for f in files):
         clock = next(p["value"] for p in hardware["parameters"] if p["name"] == "clock_reported_ghz")
         known.add((hardware["machine"]["physical_id"], round(1000 * clock)))
     assert len(np.unique(table["host"].astype(str))) == len(known) >= 2
-    expected = sum(len(p["timings"]) for f in files for p in json.loads(f.read_text())["points"])
+    expected = sum(len(p["timings"]) for f in files for p in json.loads(f.read_text(encoding="utf-8"))["points"])
     assert len(table) == expected
 
 
@@ -142,7 +142,7 @@ def test_folders(tmp_path):
     (tmp_path / "tuning.json").write_text('{"schema": "tuning/3"}')
     with pytest.raises(sapwise.InputError, match="holds no report"):
         sapwise.read_reports(tmp_path)
-    (tmp_path / "a.json").write_text(ONE.read_text())
+    (tmp_path / "a.json").write_bytes(ONE.read_bytes())
     assert len(sapwise.read_reports(tmp_path)) == len(sapwise.read_report(ONE))
     (tmp_path / "b.json").write_text("{")
     with pytest.raises(sapwise.InputError, match="b.json"):
@@ -154,7 +154,7 @@ def test_folders(tmp_path):
 
 
 def test_a_point_without_samples_is_not_a_number(tmp_path):
-    report = json.loads(ONE.read_text())
+    report = json.loads(ONE.read_text(encoding="utf-8"))
     report["points"] = report["points"][:1]
     report["points"][0]["timings"] = [{"algorithm": "brute@cpu1", "samples_ns": [], "error": "it was lost"}]
     (tmp_path / "one.json").write_text(json.dumps(report))

@@ -5,7 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
-from conftest import allowed, cubes, mixed, naive, run
+from conftest import HERE, allowed, cubes, forks, limited_by_memory, mixed, naive, run
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
@@ -288,6 +288,10 @@ def test_a_crowd_beyond_the_limit():
         space.remove(space.handles()[40:])
         space.update()
         assert len(space.pairs()) == 780 and len(space.begun()) == len(space.ended()) == 0
+
+
+@limited_by_memory
+def test_a_crowd_whose_pairs_fill_no_memory():
     # 2e11 pairs, 3.2 TB.
     with quiet() as space, pytest.raises((sapwise.TooManyPairsError, MemoryError)):
         space.insert(np.zeros((632_456, 6), np.float32))
@@ -355,10 +359,11 @@ threads = [threading.Thread(target=ask) for _ in range(3)]
 for _ in range(30): space.set(handles, boxes); space.update()
 stop.set(); [t.join() for t in threads]
 print(wrong)
-""" % __file__.rsplit("/", 1)[0]
+""" % HERE
     assert run(script).strip() == "[]"
 
 
+@forks
 def test_a_fork_has_a_space_of_its_own():
     script = """
 import os, sys, warnings
@@ -382,5 +387,5 @@ if child == 0:
 assert os.waitpid(child, 0)[1] == 0
 space.update()
 print(np.array_equal(space.pairs(), known), len(space))
-""" % __file__.rsplit("/", 1)[0]
+""" % HERE
     assert run(script).strip() == "True 60000"
