@@ -17,9 +17,17 @@ shift
 sapwise=${SAPWISE:-sapwise}
 mkdir -p "$folder"
 # A node that fails does not end the others. Two nodes may share a host name, but not the name that Slurm has for them.
+failed=0
 srun --ntasks-per-node=1 --kill-on-bad-exit=0 \
-    bash -c 'export SAPWISE_NODE=$SLURMD_NODENAME; exec "$@"' probe "$sapwise" probe --out "$folder" "$@" || true
-there=$(find "$folder" -maxdepth 1 -name '*.json' | wc -l)
+    bash -c 'export SAPWISE_NODE=$SLURMD_NODENAME; exec "$@"' probe "$sapwise" probe --out "$folder" "$@" || failed=1
+# The folder may hold reports of other jobs. The name of a report ends with a hash of its node.
+nodes=$(scontrol show hostnames "$SLURM_JOB_NODELIST")
+missing=()
+for node in $nodes; do
+    compgen -G "$folder/*-$(printf %s "$node" | sha256sum | cut -c 1-12).json" >/dev/null || missing+=("$node")
+done
+there=$((SLURM_JOB_NUM_NODES - ${#missing[@]}))
 [ "$there" = 0 ] || "$sapwise" check "$folder"
-[ "$there" -ge "$SLURM_JOB_NUM_NODES" ] \
-    || { echo "$there of $SLURM_JOB_NUM_NODES nodes left a report; submit the job again for the others"; exit 1; }
+[ ${#missing[@]} = 0 ] \
+    || { echo "$there of $SLURM_JOB_NUM_NODES nodes left a report; submit the job again for ${missing[*]}"; exit 1; }
+[ "$failed" = 0 ] || { echo "every node has a report, but a probe failed; its message is above"; exit 1; }
