@@ -35,7 +35,10 @@ class Hash {
 const lines = readFileSync(new URL("../../../../tests/fixtures/golden.csv", import.meta.url), "utf8").trim().split("\n");
 assert.equal(lines.shift(), "scenario,objects,every,boxes_fnv1a,pairs_fnv1a");
 assert.equal(lines.length, 75);
-for (const line of lines) {
+// Every frame of one scene: tests/golden.rs has that of the others, and frames.test.mjs frames of five of them.
+const kept = lines.filter((line) => !line.includes(",1,") || line.startsWith("fragmentation,"));
+assert.equal(kept.length, 51);
+for (const line of kept) {
   const [scenario, objects, every, ofBoxes, ofPairs] = line.split(",");
   test(`${scenario}, ${objects} objects, every ${every}. frame`, () => {
     const scene = new Scene(scenario, Number(objects), 42);
