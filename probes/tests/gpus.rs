@@ -120,10 +120,6 @@ fn a_gpu_is_taken_by_its_number_and_one_that_is_not_there_is_wrong_usage() {
 #[test]
 fn without_an_adapter_one_sentence_says_so_and_everything_else_works() {
     let text = success(without_adapters(&mut sapwise()).arg("predict"));
-    if text.contains("gpu0") {
-        eprintln!("skipped: this machine has adapters without Vulkan");
-        return;
-    }
     assert_eq!(text.matches("GPU").count(), 1, "{text}");
     assert!(text.contains("No GPU was found; the algorithms on the CPU are not affected."), "{text}");
 }

@@ -41,9 +41,10 @@ pub(crate) fn small_report(machine: &str) -> Value {
     report
 }
 
-/// The command without Vulkan drivers. Adapters of other interfaces stay.
+/// The command on a machine without GPUs: it asks Vulkan only, not Metal or Direct3D, and Vulkan finds no driver.
 pub(crate) fn without_adapters(command: &mut Command) -> &mut Command {
-    command.env("VK_ICD_FILENAMES", "/nonexistent").env("VK_DRIVER_FILES", "/nonexistent")
+    let nowhere = "/nonexistent";
+    command.env("WGPU_BACKEND", "vulkan").env("VK_ICD_FILENAMES", nowhere).env("VK_DRIVER_FILES", nowhere)
 }
 
 /// The answer of `sapwise devices --json` on a machine with an adapter. Without any: `None`, with a line that says
