@@ -18,8 +18,16 @@ fn public_types_are_send_and_sync() {
     both::<Error>();
 }
 
+/// Returns the number of CPUs on which a thread may run, from its `status` in `/proc`: a list such as `0-3,7`.
+#[cfg(all(feature = "measure", target_os = "linux"))]
+fn cpus(status: &str) -> usize {
+    let list = status.lines().find_map(|line| line.strip_prefix("Cpus_allowed_list:")).unwrap().trim();
+    let number = |text: &str| text.parse::<usize>().unwrap();
+    list.split(',').map(|part| part.split_once('-').map_or(1, |(from, to)| number(to) - number(from) + 1)).sum()
+}
+
 /// Returns the number of helper threads, and the number of those that may run on one CPU only.
-#[cfg(all(feature = "parallel", target_os = "linux"))]
+#[cfg(all(feature = "measure", target_os = "linux"))]
 fn pool_threads() -> (usize, usize) {
     let status =
         |task: std::io::Result<std::fs::DirEntry>| std::fs::read_to_string(task.ok()?.path().join("status")).ok();
@@ -27,15 +35,11 @@ fn pool_threads() -> (usize, usize) {
         .unwrap()
         .filter_map(status)
         .filter(|text| text.starts_with("Name:\tsapwise-"));
-    let allowed = |text: &String| {
-        let list = text.lines().find_map(|line| line.strip_prefix("Cpus_allowed_list:")).unwrap().trim();
-        list.bytes().all(|b| b.is_ascii_digit())
-    };
-    let bound: Vec<bool> = ours.map(|text| allowed(&text)).collect();
+    let bound: Vec<bool> = ours.map(|text| cpus(&text) == 1).collect();
     (bound.len(), bound.iter().filter(|&&bound| bound).count())
 }
 
-#[cfg(all(feature = "parallel", target_os = "linux"))]
+#[cfg(all(feature = "measure", target_os = "linux"))]
 #[test]
 fn no_thread_is_pinned_unless_asked() {
     use sapwise::Aabb;
@@ -55,7 +59,9 @@ fn no_thread_is_pinned_unless_asked() {
     assert_eq!(pool_threads(), (2, 0));
     registry.pin_threads();
     let pinned = run(&registry, "grid-sap@cpu2");
-    // The one helper of `grid-sap@cpu2`, unless there is a quota.
-    assert!(matches!(pool_threads(), (3, 0 | 1)), "{:?}", pool_threads());
+    // The one helper of `grid-sap@cpu2`. Under a CPU quota, which allows fewer cores than the affinity, none.
+    let affinity = cpus(&std::fs::read_to_string("/proc/thread-self/status").unwrap());
+    let bound = usize::from(usable_cores() as usize == affinity);
+    assert_eq!(pool_threads(), (3, bound), "{affinity} CPUs");
     drop((free, pinned));
 }
