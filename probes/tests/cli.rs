@@ -119,6 +119,21 @@ fn bad_boxes_are_told_with_file_frame_and_position() {
     }
 }
 
+/// On systems with a limit of the address space.
+#[cfg(target_os = "linux")]
+#[test]
+fn refused_memory_is_a_failure_of_every_method() {
+    let folder = tempfile::tempdir().unwrap();
+    // Their 72 million pairs take 576 MB.
+    let boxes = npy(folder.path(), "crowd.npy", "<f4", "12000, 6", &[0.0, 0.0, 0.0, 1.0, 1.0, 1.0].repeat(12_000));
+    for id in sapwise::Registry::new().available().into_iter().map(|entry| entry.id).filter(|id| id.threads() <= 2) {
+        let mut limited = assert_cmd::Command::new("sh");
+        limited.args(["-c", "ulimit -v 400000 && exec \"$@\"", "sh"]).arg(assert_cmd::cargo::cargo_bin!("sapwise"));
+        limited.arg("pairs").arg(&boxes).args(["--algorithm", &id.to_string()]);
+        failure(&mut limited, 1, &["crowd.npy", "frame 0", "no memory for", "pairs; set a limit"]);
+    }
+}
+
 #[test]
 fn an_unknown_algorithm_is_wrong_usage_and_names_the_known() {
     let folder = tempfile::tempdir().unwrap();
