@@ -9,12 +9,16 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 . tools/wasm-compiler.sh
 
-export CARGO_PROFILE_DEV_DEBUG=false CARGO_PROFILE_DEV_OPT_LEVEL=0 CARGO_INCREMENTAL=0
+# A folder of its own: another compiler would rebuild everything in the usual one.
+folder=${CARGO_TARGET_DIR:-target}/wasm
+# RUSTC_BOOTSTRAP lets a stable cargo take flags for some packages: the standard library, which takes minutes, is built
+# once.
+export CARGO_PROFILE_DEV_DEBUG=false CARGO_PROFILE_DEV_OPT_LEVEL=0 CARGO_INCREMENTAL=0 RUSTC_BOOTSTRAP=1
 for vectors in -simd128 +simd128; do
-    # Their own folders: another compiler would rebuild everything in the usual one, and so would other flags.
-    folder=${CARGO_TARGET_DIR:-target}/wasm$vectors
-    RUSTFLAGS="-C target-feature=$vectors" \
-        cargo build --quiet --locked -p sapwise-example-wasm --target $target --target-dir "$folder" "${options[@]}"
+    flags="rustflags = ['-Ctarget-feature=$vectors']"
+    cargo build --quiet --locked -p sapwise-example-wasm --target $target --target-dir "$folder" "${options[@]}" \
+        -Zprofile-rustflags --config "profile.dev.package.sapwise.$flags" \
+        --config "profile.dev.package.sapwise-example-wasm.$flags"
     node --input-type=module - "$folder/$target/debug/sapwise-example-wasm.wasm" "$vectors" <<'JS'
 import { readFileSync } from "node:fs";
 
