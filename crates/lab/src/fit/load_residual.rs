@@ -51,9 +51,11 @@ pub(crate) fn noise_ln(behind: f64) -> f64 {
 /// least: a pivoted Cholesky decomposition of the covariance (Fine and Scheinberg, Efficient SVM training using
 /// low-rank kernel representations, 2001).
 ///
-/// They are chosen once for all fits: loads are the same on every machine, so that nothing of a held-out one leaks.
+/// They are chosen once for all fits, from the loads of held-out machines too. At the sizes of an ascent every machine
+/// has alike loads. Visits have sizes of their own: a held-out machine contributes loads near its crossovers, but none
+/// of its times.
 pub(crate) fn places(profiles: &[Profile], without: Option<&str>) -> Places {
-    // Profiles of one seed have the same scenes and loads.
+    // At the same size of a scenario loads are alike: the first stands for all.
     let mut loads: BTreeMap<(&str, u32), Load> = BTreeMap::new();
     for spot in profiles.iter().flat_map(|p| &p.points).filter(|s| Some(s.scenario.as_str()) != without) {
         loads.entry((&spot.scenario, spot.load.objects)).or_insert(spot.load);
