@@ -15,6 +15,11 @@ const DISTINCT: f64 = 2.326;
 /// Two times that differ by less than this count as equal, however exact they are.
 const LEAST_LN: f64 = 0.02;
 
+/// Returns the standard error of the median of values; `None` without any.
+pub(crate) fn median_error(values: &[f64]) -> Option<f64> {
+    Some(MEDIAN_OVER_MEAN * robust_deviation(values)? / (values.len() as f64).sqrt())
+}
+
 /// Frames of two algorithms at one size. The k-th sample of both is the same frame; a sample without a partner is
 /// ignored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,7 +57,7 @@ struct Size {
 }
 
 impl Size {
-    /// Of the ratios at each point of one size, with their spread over the frames.
+    /// Of the ratios at each point of one size, with their standard errors over the frames.
     fn of(objects: u32, points: &[(f64, f64)]) -> Self {
         let (ratios, errors): (Vec<f64>, Vec<f64>) = points.iter().copied().unzip();
         // What changed between two points shows in neither's frames.
@@ -71,13 +76,20 @@ impl PairedRatio {
     /// Compares two algorithms at points where both were timed, in any order; a size may have several points. `None`
     /// with fewer than three sizes that have a pair of samples above zero.
     pub(crate) fn new(points: &[PairedSamples<'_>]) -> Option<Self> {
-        let mut sizes: BTreeMap<u32, Vec<(f64, f64)>> = BTreeMap::new();
-        for point in points.iter().filter(|p| p.objects > 0) {
+        let of_point = |point: &PairedSamples<'_>| {
             let pairs = point.first_ns.iter().zip(point.second_ns).filter(|(a, b)| **a > 0 && **b > 0);
             let ratios: Vec<f64> = pairs.map(|(&a, &b)| (a as f64 / b as f64).ln()).collect();
-            let (Some(ratio), Some(spread)) = (median(&ratios), robust_deviation(&ratios)) else { continue };
-            let error = MEDIAN_OVER_MEAN * spread / (ratios.len() as f64).sqrt();
-            sizes.entry(point.objects).or_default().push((ratio, error));
+            Some((point.objects, median(&ratios)?, median_error(&ratios)?))
+        };
+        Self::of_ratios(points.iter().filter_map(of_point))
+    }
+
+    /// Compares two algorithms by `ln(first / second)` at each point, with its standard error, after the number of
+    /// objects.
+    pub(crate) fn of_ratios(points: impl Iterator<Item = (u32, f64, f64)>) -> Option<Self> {
+        let mut sizes: BTreeMap<u32, Vec<(f64, f64)>> = BTreeMap::new();
+        for (objects, ratio, error) in points.filter(|p| p.0 > 0 && p.1.is_finite()) {
+            sizes.entry(objects).or_default().push((ratio, error));
         }
         let sizes: Vec<Size> = sizes.iter().map(|(&objects, points)| Size::of(objects, points)).collect();
         (sizes.len() >= 3).then_some(Self { sizes })
@@ -192,6 +204,16 @@ mod tests {
         assert!(found <= 10, "{found} crossings in 50 comparisons");
         let (low, high) = crossing_at_1000(0.001, 1).interval(1000.0).unwrap();
         assert!(low < 300.0 && high > 3000.0, "{low} to {high}");
+    }
+
+    #[test]
+    fn what_lies_within_the_errors_does_not_cross() {
+        let crossings = |error: f64| {
+            let ratios =
+                [(100, -0.1, error), (200, 0.1, error), (400, -0.1, error), (0, 1.0, 0.0), (800, f64::NAN, 0.0)];
+            PairedRatio::of_ratios(ratios.into_iter()).unwrap().crossings().len()
+        };
+        assert_eq!((crossings(0.0), crossings(0.04), crossings(0.05)), (2, 2, 0));
     }
 
     #[test]

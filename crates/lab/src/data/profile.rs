@@ -1,11 +1,12 @@
 //! A report as training sees it: the hardware, and the median of each algorithm at each point.
 
+use crate::paired::median_error;
 use crate::report::{Label, Point, Report, Timed, Timing};
-use crate::sweep::median;
 use sapwise::AlgorithmId;
 use sapwise::algorithm::{BackendClass, Entry, Load};
 use sapwise_tune::Hardware;
 use sapwise_tune::hardware::ParameterId;
+use sapwise_tune::stats::{mean, median};
 use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -29,7 +30,7 @@ pub struct Profile {
 }
 
 /// One point of a report.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Spot {
     /// Name of the scenario.
     pub scenario: String,
@@ -40,6 +41,8 @@ pub struct Spot {
     /// The mean over the frames of each of these, in the same order. It includes the frames in which an incremental
     /// algorithm rebuilds.
     pub means: Vec<f64>,
+    /// The standard error of the natural logarithm of each median, in the same order.
+    pub errors_ln: Vec<f64>,
 }
 
 /// Samples that a median needs, so that one disturbed frame does not move it.
@@ -140,9 +143,10 @@ impl Profile {
         let place = |k: u16| kept[..usize::from(k)].iter().filter(|k| **k).count() as u16;
         for spot in &mut self.points {
             let stays: Vec<bool> = spot.medians.iter().map(|m| kept[usize::from(m.0)]).collect();
-            let mut stays_too = stays.iter().chain(&stays);
+            let mut stays_too = stays.iter().cycle();
             spot.medians.retain(|_| stays_too.next() == Some(&true));
             spot.means.retain(|_| stays_too.next() == Some(&true));
+            spot.errors_ln.retain(|_| stays_too.next() == Some(&true));
             spot.medians.iter_mut().for_each(|m| m.0 = place(m.0));
         }
         self.points.retain(|s| !s.medians.is_empty());
@@ -198,13 +202,18 @@ pub fn is_sound(timing: &Timing) -> bool {
 
 impl Spot {
     fn of(point: &Point, algorithms: &[Timed]) -> Self {
-        let timing = |t: &Timing| {
-            let k = algorithms.iter().position(|a| a.id == t.algorithm)?;
-            let mean = t.samples_ns.iter().sum::<u64>() as f64 / t.samples_ns.len() as f64;
-            Some(((k as u16, median(&t.samples_ns)?), mean))
-        };
-        let (medians, means) = point.timings.iter().filter(|t| is_sound(t)).filter_map(timing).unzip();
-        Self { scenario: point.scenario.clone(), load: point.load, medians, means }
+        let mut spot = Self { scenario: point.scenario.clone(), load: point.load, ..Self::default() };
+        for timing in point.timings.iter().filter(|t| is_sound(t)) {
+            let position = algorithms.iter().position(|a| a.id == timing.algorithm);
+            let ns: Vec<f64> = timing.samples_ns.iter().map(|&ns| ns as f64).collect();
+            let (Some(k), Some(median_ns)) = (position, median(&ns)) else { continue };
+            // A clock may read 0.
+            let ln: Vec<f64> = ns.iter().map(|ns| ns.max(1.0).ln()).collect();
+            spot.medians.push((k as u16, median_ns));
+            spot.means.push(mean(&ns));
+            spot.errors_ln.push(median_error(&ln).unwrap_or(0.0));
+        }
+        spot
     }
 
     /// Returns the least median in ns.
@@ -214,6 +223,11 @@ impl Spot {
 
     /// Returns the median of the algorithm at a position, in ns.
     pub fn of_position(&self, algorithm: u16) -> Option<f64> {
-        self.medians.iter().find(|m| m.0 == algorithm).map(|m| m.1)
+        self.with_error(algorithm).map(|m| m.0)
+    }
+
+    /// Returns the median of the algorithm at a position in ns, and the standard error of its natural logarithm.
+    pub fn with_error(&self, algorithm: u16) -> Option<(f64, f64)> {
+        self.medians.iter().zip(&self.errors_ln).find(|(m, _)| m.0 == algorithm).map(|(m, error)| (m.1, *error))
     }
 }

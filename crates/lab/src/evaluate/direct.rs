@@ -2,9 +2,9 @@
 //! from hardware parameters, and a choice by the number of objects alone.
 
 use super::regret_table::Strategy;
-use crate::data::{Profile, figure};
+use crate::data::{Profile, Spot, figure};
 use crate::fit::columns::Columns;
-use crate::paired::{Crossing, PairedRatio, PairedSamples};
+use crate::paired::{Crossing, PairedRatio};
 use anyhow::{Context, Result};
 use linfa::DatasetBase;
 use linfa::traits::Fit;
@@ -60,27 +60,19 @@ pub(super) fn role_outcomes(profile: &Profile) -> Vec<RoleOutcome> {
     let scenario = profile.usual_scenario();
     let ids: Vec<AlgorithmId> = profile.algorithms.iter().map(|t| t.id.clone()).collect();
     let roles = roles(&ids);
-    let medians = |id: &AlgorithmId| -> Vec<Option<[u64; 1]>> {
-        let own = profile.position(id);
-        let within = profile.points.iter().filter(|p| p.scenario == scenario);
-        // In picoseconds: only ratios count, and short times would lose digits as whole nanoseconds.
-        within.map(|p| p.of_position(own?).map(|ns| [(1e3 * ns).round() as u64])).collect()
-    };
-    let objects: Vec<u32> = profile.points.iter().filter(|p| p.scenario == scenario).map(|p| p.load.objects).collect();
-    let timed: Vec<Vec<Option<[u64; 1]>>> = roles.iter().map(|(_, id)| medians(id)).collect();
+    let within = || profile.points.iter().filter(|p| p.scenario == scenario);
     let mut outcomes = Vec::new();
-    for a in 0..roles.len() {
-        for b in a + 1..roles.len() {
-            let both = objects.iter().zip(timed[a].iter().zip(&timed[b]));
-            let points: Vec<PairedSamples<'_>> = both
-                .filter_map(|(&objects, (first, second))| {
-                    Some(PairedSamples { objects, first_ns: first.as_ref()?, second_ns: second.as_ref()? })
-                })
-                .collect();
-            if let Some(ratio) = PairedRatio::new(&points) {
+    for (a, (first, first_id)) in roles.iter().enumerate() {
+        for (second, second_id) in &roles[a + 1..] {
+            let ratio = |spot: &Spot| {
+                let [a, b] = [first_id, second_id].map(|id| spot.with_error(profile.position(id)?));
+                let ((a, a_error), (b, b_error)) = a.zip(b)?;
+                Some((spot.load.objects, (a / b).ln(), a_error.hypot(b_error)))
+            };
+            if let Some(ratio) = PairedRatio::of_ratios(within().filter_map(ratio)) {
                 outcomes.push(RoleOutcome {
-                    first: roles[a].0.clone(),
-                    second: roles[b].0.clone(),
+                    first: first.clone(),
+                    second: second.clone(),
                     crossings: ratio.crossings(),
                     first_is_cheaper: ratio.first_is_cheaper(),
                 });
