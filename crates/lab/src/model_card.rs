@@ -55,9 +55,10 @@ host counts the same. A choice that was not timed nearby is charged ten times th
 /// What the strategies are.
 const STRATEGIES: &str = "
 `physics + load` is what `predict` does, `physics` the same without the residual. `random forest` predicts times
-from load and parameters. `nearest machine` takes the measured costs of the most similar host. `direct regression`
-is the paper's: crossovers as power laws of parameters, and a choice by the number of objects. `frozen constants`
-switch from brute force at 64 (nexus) or 1000 objects (mujoco_warp). `single best` is always the same algorithm.
+from load and parameters. `nearest machine` takes the measured costs of the most similar host, of all threads for all
+threads. `direct regression` is the paper's: crossovers as power laws of parameters, and a choice by the number of
+objects. `frozen constants` switch from brute force at 64 (nexus) or 1000 objects (mujoco_warp). `single best` is always
+one method on one thread, or always on all: whichever lost least on the other hosts.
 `full sweep` has measured the held-out host itself: in a seen scenario it is judged by the timings that it was fitted
 to, in an unseen one by those of the scenario that it was not fitted to.
 ";

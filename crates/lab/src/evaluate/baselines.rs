@@ -1,6 +1,7 @@
 //! The simple strategies that a prediction has to beat.
 
-use super::regret_table::{NOT_TIMED, Strategy};
+use super::regret_table::Strategy;
+use super::role::{Role, roles};
 use crate::data::{COMPARED, COMPARED_OF_GPUS, Profile, figure};
 use sapwise::algorithm::BackendClass;
 use sapwise::tuning::AlgorithmCost;
@@ -8,19 +9,28 @@ use sapwise::{AlgorithmId, Tuning};
 use sapwise_tune::Hardware;
 use sapwise_tune::model::GPU_PREFIX;
 use sapwise_tune::stats;
+use std::collections::BTreeMap;
 
-/// Always chooses the algorithm with the least mean regret over the training profiles, each of which comes with the
-/// regret of always choosing each of its algorithms and counts the same.
+/// Always chooses the role with the least mean regret over the training profiles that have it, each of which comes with
+/// the regret of always choosing each of its algorithms. Every machine counts the same; its profiles share its weight.
 pub(super) fn single_best<'a>(training: &[(&Profile, &[f64])], available: &[AlgorithmId]) -> Strategy<'a> {
-    let mean = |id: &AlgorithmId| {
-        let of = |(profile, always): &(&Profile, &[f64])| {
-            profile.position(id).map_or(NOT_TIMED - 1.0, |k| always[usize::from(k)])
-        };
-        training.iter().map(of).sum::<f64>()
+    let regret = |role: &Role| -> Option<f64> {
+        let mut machines: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+        for (profile, always) in training {
+            let own = role.among(profile.algorithms.iter().map(|t| &t.id)).and_then(|id| profile.position(id));
+            if let Some(k) = own {
+                machines.entry(profile.machine()).or_default().push(always[usize::from(k)]);
+            }
+        }
+        let means: Vec<f64> = machines.values().map(|regrets| stats::mean(regrets)).collect();
+        (!means.is_empty()).then(|| stats::mean(&means))
     };
-    let mut scored: Vec<(f64, &AlgorithmId)> = available.iter().map(|id| (mean(id), id)).collect();
-    scored.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let chosen = scored.first().map(|s| s.1.clone());
+    // Where there is one thread, it is all threads too.
+    let known = roles(available).into_iter().flat_map(|(role, _)| [Role { all: true, ..role.clone() }, role]);
+    let mut candidates: Vec<Role> = known.collect();
+    candidates.sort();
+    let best = candidates.iter().filter_map(|role| Some((regret(role)?, role))).min_by(|a, b| a.0.total_cmp(&b.0));
+    let chosen = best.and_then(|(_, role)| role.among(available.iter()).cloned());
     Box::new(move |_| chosen.clone())
 }
 
@@ -41,11 +51,39 @@ pub(super) fn frozen<'a>(last: u32, above: &str, available: &[AlgorithmId]) -> S
 
 /// Chooses the cheapest by cost curves. The nearest number of threads stands in for one that the machine doesn't have.
 pub fn by_costs(costs: Vec<AlgorithmCost>, available: &[AlgorithmId]) -> Strategy<'_> {
-    let tuning = Tuning::from_costs(sapwise::tuning::Source::Measured, "", costs, &[]);
+    by_tuning(tuning(costs), available)
+}
+
+fn tuning(costs: Vec<AlgorithmCost>) -> Tuning {
+    Tuning::from_costs(sapwise::tuning::Source::Measured, "", costs, &[])
+}
+
+fn by_tuning(tuning: Tuning, available: &[AlgorithmId]) -> Strategy<'_> {
     Box::new(move |load| {
         let (best, _) = tuning.cheapest(load, |k| closest(&tuning.costs[k].algorithm, available).is_some())?;
         closest(&tuning.costs[best].algorithm, available)
     })
+}
+
+/// Returns the costs of another machine under the names of this one's algorithms: all threads stand for all threads,
+/// and fewer for the same number. What has no counterpart is left out.
+pub(super) fn of_another(costs: &[AlgorithmCost], available: &[AlgorithmId]) -> Vec<AlgorithmCost> {
+    let theirs: Vec<AlgorithmId> = costs.iter().map(|c| c.algorithm.clone()).collect();
+    let whole = roles(&theirs).into_iter().filter(|(role, _)| role.all);
+    let whole: Vec<(&AlgorithmCost, AlgorithmId)> = whole
+        .filter_map(|(role, id)| {
+            let own = role.among(available.iter()).filter(|own| own.backend().width() > 1)?;
+            Some((costs.iter().find(|c| c.algorithm == id)?, own.clone()))
+        })
+        .collect();
+    let same = costs.iter().filter(|c| {
+        let taken = whole.iter().any(|(known, own)| known.algorithm == c.algorithm || *own == c.algorithm);
+        !taken && available.contains(&c.algorithm)
+    });
+    let same: Vec<(&AlgorithmCost, AlgorithmId)> = same.map(|c| (c, c.algorithm.clone())).collect();
+    let named =
+        |(c, id): (&AlgorithmCost, AlgorithmId)| AlgorithmCost::new(id, c.revision, c.curve.clone(), c.spread_ln);
+    same.into_iter().chain(whole).map(named).collect()
 }
 
 /// Returns the available algorithm of the same method and class of processor whose number of threads or GPUs is
@@ -107,6 +145,43 @@ mod tests {
         assert_eq!(frozen(64, "sap", &available)(&load(100)), None);
         assert_eq!(closest(&"grid-sap@cpu16".parse().unwrap(), &available).unwrap().to_string(), "grid-sap@cpu8");
         assert_eq!(closest(&"tree@cpu1".parse().unwrap(), &available), None);
+    }
+
+    #[test]
+    fn all_threads_stand_for_all_threads() {
+        let cost = |id: &AlgorithmId| {
+            crate::synthetic::true_costs(&Machine::family()[0].hardware(), std::slice::from_ref(id)).remove(0)
+        };
+        let names = |theirs: &[&str], own: &[&str]| -> Vec<String> {
+            let costs: Vec<AlgorithmCost> = ids(theirs).iter().map(cost).collect();
+            of_another(&costs, &ids(own)).iter().map(|c| c.algorithm.to_string()).collect()
+        };
+        let [two, sixteen] = [&["bvh@cpu1", "bvh@cpu2"][..], &["bvh@cpu1", "bvh@cpu2", "bvh@cpu16", "sap@cpu1"]];
+        assert_eq!(names(two, sixteen), ["bvh@cpu1", "bvh@cpu16"]);
+        assert_eq!(names(sixteen, two), ["bvh@cpu1", "bvh@cpu2"]);
+        assert_eq!(names(sixteen, &two[..1]), ["bvh@cpu1"]);
+        let found = of_another(&ids(sixteen).iter().map(cost).collect::<Vec<_>>(), &ids(two));
+        assert_eq!(found[1].curve, cost(&"bvh@cpu16".parse().unwrap()).curve);
+    }
+
+    #[test]
+    fn one_role_is_chosen_by_the_machines_that_have_it() {
+        let family = Machine::family();
+        let profiles: Vec<Profile> = family[..3].iter().map(|m| Profile::of("", &m.report())).collect();
+        // All threads of `bvh` lose least on each machine, which has 2, 4 and 8.
+        let regrets: Vec<Vec<f64>> = profiles
+            .iter()
+            .zip([2, 4, 8])
+            .map(|(p, most)| {
+                let of = |id: &AlgorithmId| if id.method() == "bvh" && id.threads() == most { 0.1 } else { 0.5 };
+                p.algorithms.iter().map(|t| of(&t.id)).collect()
+            })
+            .collect();
+        let training: Vec<(&Profile, &[f64])> = profiles.iter().zip(&regrets).map(|(p, r)| (p, &r[..])).collect();
+        for (own, chosen) in [(&["bvh@cpu1", "bvh@cpu16", "sap@cpu1"][..], "bvh@cpu16"), (&["bvh@cpu1"], "bvh@cpu1")] {
+            let choose = single_best(&training, &ids(own));
+            assert_eq!(choose(&Load::of_objects(9)).unwrap().to_string(), chosen);
+        }
     }
 
     #[test]

@@ -13,6 +13,7 @@ use sapwise::AlgorithmId;
 use sapwise::tuning::AlgorithmCost;
 use sapwise_tune::Model;
 use sapwise_tune::model::MethodModel;
+use std::borrow::Cow;
 use std::sync::OnceLock;
 
 const PHYSICS: &str = "physics";
@@ -65,7 +66,7 @@ pub(super) struct Contestant<'a> {
     pub(super) name: &'static str,
     pub(super) choose: Strategy<'a>,
     /// The costs that it chooses by, if it predicts any.
-    pub(super) costs: Option<&'a [AlgorithmCost]>,
+    pub(super) costs: Option<Costs<'a>>,
 }
 
 impl<'a> Material<'a> {
@@ -155,8 +156,8 @@ impl Fitted<'_> {
     ) -> [Contestant<'b>; 4] {
         let always: Vec<(&Profile, &[f64])> = self.always.iter().map(|(p, means)| (*p, &means[..])).collect();
         [
-            by(OURS, ours.map(|o| &o.whole[..]), available),
-            by(PHYSICS, ours.map(|o| &o.physics[..]), available),
+            by(OURS, ours.map(|o| Cow::Borrowed(&o.whole[..])), available),
+            by(PHYSICS, ours.map(|o| Cow::Borrowed(&o.physics[..])), available),
             alone(FOREST, self.forests.chooser(&profile.hardware, available)),
             alone(SINGLE_BEST, baselines::single_best(&always, available)),
         ]
@@ -174,9 +175,10 @@ impl Fitted<'_> {
         available: &'b [AlgorithmId],
     ) -> Result<Vec<Contestant<'b>>> {
         let (profile, seen) = (&data.profiles[held], self.seen);
-        let nearest = baselines::nearest(&self.likeness, &data.likeness[held]).map(|k| seen.costs(self.known[k]));
+        let nearest = baselines::nearest(&self.likeness, &data.likeness[held]);
+        let nearest = nearest.map(|k| baselines::of_another(seen.costs(self.known[k]), available));
         let mut all = Vec::from(self.ours(profile, ours, available));
-        all.push(by(NEAREST, nearest, available));
+        all.push(by(NEAREST, nearest.map(Cow::Owned), available));
         if seen.without.is_none() {
             let crossed: Vec<(&Profile, &[RoleOutcome])> =
                 self.known.iter().map(|&k| (&data.profiles[k], &data.outcomes[k][..])).collect();
@@ -187,13 +189,16 @@ impl Fitted<'_> {
             ]);
         }
         // Only the scenario is held out from it, not its own machine. Crossovers are measured by its costs.
-        all.push(Contestant { costs: None, ..by(FULL_SWEEP, Some(seen.costs(held)), available) });
+        all.push(Contestant { costs: None, ..by(FULL_SWEEP, Some(Cow::Borrowed(seen.costs(held))), available) });
         Ok(all)
     }
 }
 
+/// Costs that a model keeps, or that were made for one choice.
+type Costs<'a> = Cow<'a, [AlgorithmCost]>;
+
 /// Chooses the cheapest by costs, or nothing, which counts as the worst, without any.
-fn by<'a>(name: &'static str, costs: Option<&'a [AlgorithmCost]>, available: &'a [AlgorithmId]) -> Contestant<'a> {
+fn by<'a>(name: &'static str, costs: Option<Costs<'a>>, available: &'a [AlgorithmId]) -> Contestant<'a> {
     let costs = costs.unwrap_or_default();
     let choose: Strategy<'_> = if costs.is_empty() { Box::new(|_| None) } else { by_costs(costs.to_vec(), available) };
     Contestant { name, choose, costs: Some(costs) }

@@ -2,6 +2,7 @@
 //! from hardware parameters, and a choice by the number of objects alone.
 
 use super::regret_table::Strategy;
+use super::role::{Role, roles};
 use crate::data::{Profile, Spot, figure};
 use crate::fit::columns::Columns;
 use crate::paired::{Crossing, PairedRatio};
@@ -31,15 +32,6 @@ const GPU_PARAMETERS: [&str; 4] = [
     "gpu/upload_rate_gb_per_s",
     "gpu/arithmetic_gflop_per_s",
 ];
-
-/// A method on one or all threads of its machine, or on one or all GPUs: every machine has these, whatever its counts.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-struct Role {
-    class: BackendClass,
-    method: String,
-    /// All threads, or all GPUs; `false` if there is only one.
-    all: bool,
-}
 
 /// Which of two roles is cheaper at which sizes, on one machine.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,22 +72,6 @@ pub(super) fn role_outcomes(profile: &Profile) -> Vec<RoleOutcome> {
         }
     }
     outcomes
-}
-
-/// Returns the roles of algorithms on a machine, in order. Of several single GPUs the first one counts.
-fn roles(ids: &[AlgorithmId]) -> Vec<(Role, AlgorithmId)> {
-    let mut roles: Vec<(Role, AlgorithmId)> = Vec::new();
-    for id in ids {
-        let (class, width) = (id.backend().class(), id.backend().width());
-        let alike = |o: &&AlgorithmId| o.method() == id.method() && o.backend().class() == class;
-        let most = ids.iter().filter(alike).map(|o| o.backend().width()).max();
-        let role = Role { class, method: id.method().to_owned(), all: width > 1 };
-        if (width == 1 || Some(width) == most) && roles.iter().all(|r| r.0 != role) {
-            roles.push((role, id.clone()));
-        }
-    }
-    roles.sort();
-    roles
 }
 
 /// The prediction for a pair of roles.

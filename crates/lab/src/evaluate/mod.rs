@@ -11,6 +11,7 @@ mod held_out;
 mod influence;
 mod partition;
 mod regret_table;
+mod role;
 mod scores;
 mod validate;
 

@@ -145,7 +145,7 @@ fn held_out(data: &Material<'_>, seen: &Seen<'_>, fitted: &Fitted<'_>, judged: &
         let regret = |contestant: Contestant<'_>| {
             let regret = data.regret_table(held).regret(profile, &contestant.choose);
             let by_means = Some(means.regret(profile, &contestant.choose));
-            let crossings = contestant.costs.map(|costs| measured.iter().flat_map(|m| m.errors(costs)).collect());
+            let crossings = contestant.costs.map(|costs| measured.iter().flat_map(|m| m.errors(&costs)).collect());
             Judged { by_means, ..Judged::new(contestant.name, profile, regret, crossings) }
         };
         found.judged.extend(contestants.into_iter().map(regret));
