@@ -411,8 +411,8 @@ def page_of_heldout():
     ]
     return (
         "# Machines held out\n\n"
-        "[Regret](../docs/methodology.md#regret-and-what-is-held-out) in percent; in parentheses "
-        "least–largest host ([each](regrets.csv)). *In games*: weighted around 800 boxes. "
+        "[Regret](../docs/methodology.md#regret-and-what-is-held-out) in percent (least–largest "
+        "[host](regrets.csv)). *In games*: around 800 boxes. "
         "`six-hosts`: commit 22f9246, older algorithms.\n\n"
         + table(["model", "strategy", "unseen scenario", "in games", "seen scenario"], body)
         + "\nHosts measured after the model was committed, by profile:\n\n"
@@ -514,7 +514,7 @@ def small_pages():
             captions = "\n".join(caption(file, None) + "\n" for file in files)
             body = table(list(kept[0]), [row.values() for row in kept])
             if name == "avian":
-                body += "\n`pile` is in the file only: its bodies fall asleep at other steps with each broad phase.\n"
+                body += "\n`pile` (file only) sleeps at other steps with each broad phase.\n"
             yield f"{name}.md", f"# {name.capitalize()}\n\n{body}\n{captions}"
 
 

@@ -28,25 +28,24 @@ const NO_GPUS: &str = " Not for GPUs.\n";
 const GPUS: &str = "
 
 On GPUs the terms are round trips, dependent dispatches, bytes up and down, bytes moved within the memory of the
-GPU, tests, and the cycles that the CPU spends on boxes and pairs. Several GPUs count with the slowest latency and
-the sum of their rates. Software adapters are used only if no real GPU was in the training.
+GPU, tests, and the cycles that the CPU spends on boxes and pairs. Software adapters are used only if no real GPU was
+in the training.
 ";
 
 /// What the columns of the scores mean.
 const COLUMNS: &str = "
 Regret is the time of the chosen algorithm over that of the best one, less one. Each number is the mean over
 scenarios and quarters of a decade of objects and, in parentheses, weighted by how often games have that many
-objects. That weight is an assumption: log-normal around 800, two thirds of the frames between 220 and 2800. Every
-host counts the same. A choice that was not timed nearby is charged ten times the best.
+objects. That weight is an assumption: log-normal around 800. Every host counts the same. A choice that was not timed
+nearby is charged ten times the best.
 
 - **unseen scenario**: the host and the scenario were held out. A user's scene is none of ours: this is the number
   that counts.
 - **seen scenario**: only the host was held out. **least to largest**: of the hosts, in seen scenarios.
 - **one thread**, **several**: seen scenarios, by the threads of the report.
 - **by means**: judged by the mean over frames instead of the median, which includes rebuilds and interruptions.
-- **crossovers off by**: median distance between measured and predicted crossovers of all scenarios; an octave is a
-  factor of two in objects, and *near* is within half of one. Counted if the algorithm below the crossover costs over
-  1.1 times the one above at twice the objects.
+- **crossovers off by**: median distance between measured and predicted crossovers; *near* is within half an octave, a
+  factor of 1.4 in objects. Counted if the algorithm below costs over 1.1 times the one above at twice the objects.
 - **over 10 %**: share of the cells in which the choice cost a tenth more than the best, or worse.
 - **floor**: the best of the same cell in a repeated run. **another run's full sweep** chooses by the costs of that
   run. Smaller differences say nothing.
@@ -54,13 +53,13 @@ host counts the same. A choice that was not timed nearby is charged ten times th
 
 /// What the strategies are.
 const STRATEGIES: &str = "
-`physics + load` is what `predict` does, `physics` the same without the residual. `random forest` predicts times
-from load and parameters. `nearest machine` takes the measured costs of the most similar host, of all threads for all
-threads. `direct regression` is the paper's: crossovers as power laws of parameters, and a choice by the number of
-objects. `frozen constants` switch from brute force at 64 (nexus) or 1000 objects (mujoco_warp). `single best` is always
-one method on one thread, or always on all: whichever lost least on the other hosts.
-`full sweep` has measured the held-out host itself: in a seen scenario it is judged by the timings that it was fitted
-to, in an unseen one by those of the scenario that it was not fitted to.
+`physics + load` is what `predict` does, `physics` the same without the residual. `physics + load, running` chooses
+among what a program runs: without `sap`, `grid-sap` and `bvh` on the CPU. `random forest` predicts times from load and
+parameters. `nearest machine` takes the measured costs of the most similar host, of all threads for all threads.
+`direct regression` is the paper's: crossovers as power laws of parameters, and a choice by the number of objects.
+`frozen constants` switch from brute force at 64 (nexus) or 1000 objects (mujoco_warp). `single best` is always one
+method on one thread, or always on all: whichever lost least on the other hosts.
+`full sweep` has measured the held-out host itself, but not an unseen scenario.
 ";
 
 /// Returns the model card as a page of Markdown, with the notes of the training.
@@ -129,9 +128,9 @@ fn intervals(validation: &Validation) -> String {
         return "None: fewer than two hosts were held out.\n".to_owned();
     };
     format!(
-        "On {} held out, in seen scenarios, nine of ten times lay within a factor of {:.2} of their prediction, and nine \
-         of ten ratios of the two fastest algorithms within {:.2}, which makes the intervals of predicted crossovers. \
-         The factors of the other hosts held for {} of the times of a host and for {} of the ratios.\n",
+        "On {} held out, in seen scenarios, nine of ten times lay within a factor of {:.2} of their prediction, and \
+         nine of ten ratios of the two fastest algorithms within {:.2}, which makes the intervals of predicted \
+         crossovers. The factors of the other hosts held for {} of the times of a host and for {} of the ratios.\n",
         count(c.physical_machines, "host"),
         c.times_90_ln.exp(),
         c.ratios_90_ln.exp(),

@@ -54,6 +54,11 @@ pub fn by_costs(costs: Vec<AlgorithmCost>, available: &[AlgorithmId]) -> Strateg
     by_tuning(tuning(costs), available)
 }
 
+/// Does the same among the algorithms that a program runs unless it asks for others.
+pub(super) fn by_costs_of_running(costs: Vec<AlgorithmCost>, available: &[AlgorithmId]) -> Strategy<'_> {
+    by_tuning(tuning(costs).for_running(), available)
+}
+
 fn tuning(costs: Vec<AlgorithmCost>) -> Tuning {
     Tuning::from_costs(sapwise::tuning::Source::Measured, "", costs, &[])
 }

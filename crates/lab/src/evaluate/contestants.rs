@@ -1,10 +1,10 @@
 //! The strategies that a prediction competes with, and what each is fitted to.
 
-use super::baselines::{self, Likeness, by_costs};
+use super::baselines::{self, Likeness, by_costs, by_costs_of_running};
 use super::direct::{RoleOutcome, direct, role_outcomes};
 use super::forest::{Forests, Table};
 use super::regret_table::{RegretTable, Strategy};
-use super::scores::{OURS, SINGLE_BEST};
+use super::scores::{OURS, RUNNING, SINGLE_BEST};
 use crate::data::Profile;
 use crate::fit::{Designs, costs_of_one, model};
 use anyhow::Result;
@@ -65,7 +65,7 @@ pub(super) struct Ours {
 pub(super) struct Contestant<'a> {
     pub(super) name: &'static str,
     pub(super) choose: Strategy<'a>,
-    /// The costs that it chooses by, if it predicts any.
+    /// The costs that its crossovers are derived from, if any.
     pub(super) costs: Option<Costs<'a>>,
 }
 
@@ -153,10 +153,11 @@ impl Fitted<'_> {
         profile: &'b Profile,
         ours: Option<&'b Ours>,
         available: &'b [AlgorithmId],
-    ) -> [Contestant<'b>; 4] {
+    ) -> [Contestant<'b>; 5] {
         let always: Vec<(&Profile, &[f64])> = self.always.iter().map(|(p, means)| (*p, &means[..])).collect();
         [
             by(OURS, ours.map(|o| Cow::Borrowed(&o.whole[..])), available),
+            alone(RUNNING, running(ours, available)),
             by(PHYSICS, ours.map(|o| Cow::Borrowed(&o.physics[..])), available),
             alone(FOREST, self.forests.chooser(&profile.hardware, available)),
             alone(SINGLE_BEST, baselines::single_best(&always, available)),
@@ -204,7 +205,13 @@ fn by<'a>(name: &'static str, costs: Option<Costs<'a>>, available: &'a [Algorith
     Contestant { name, choose, costs: Some(costs) }
 }
 
-/// A strategy that predicts no costs.
+/// Chooses the cheapest by our costs among what a program runs.
+fn running<'a>(ours: Option<&Ours>, available: &'a [AlgorithmId]) -> Strategy<'a> {
+    let costs = ours.map(|o| o.whole.clone()).unwrap_or_default();
+    if costs.is_empty() { Box::new(|_| None) } else { by_costs_of_running(costs, available) }
+}
+
+/// A strategy that is not judged by costs.
 fn alone<'a>(name: &'static str, choose: Strategy<'a>) -> Contestant<'a> {
     Contestant { name, choose, costs: None }
 }
