@@ -1,9 +1,10 @@
 //! A report as training sees it: the hardware, and the median of each algorithm at each point.
 
+use super::compared::is_real;
 use crate::paired::median_error;
 use crate::report::{Label, Point, Report, Timed, Timing};
 use sapwise::AlgorithmId;
-use sapwise::algorithm::{BackendClass, Entry, Load};
+use sapwise::algorithm::{Backend, BackendClass, Entry, Load};
 use sapwise_tune::Hardware;
 use sapwise_tune::hardware::ParameterId;
 use sapwise_tune::stats::{mean, median};
@@ -127,6 +128,12 @@ impl Profile {
     /// Returns whether an algorithm ran on the CPU.
     pub fn has_cpu(&self) -> bool {
         self.algorithms.iter().any(|t| t.id.backend().class() == BackendClass::Cpu)
+    }
+
+    /// Returns whether an algorithm ran on a GPU that is no software adapter.
+    pub fn has_real_gpu(&self) -> bool {
+        let real = |index: &u32| self.hardware.gpu(*index).is_some_and(is_real);
+        self.algorithms.iter().any(|t| matches!(t.id.backend(), Backend::Gpu(indices) if indices.iter().any(real)))
     }
 
     /// Returns the position of an algorithm among those of the report.

@@ -10,6 +10,7 @@ use crate::fit::{Designs, costs_of_one, model};
 use anyhow::Result;
 use rayon::prelude::*;
 use sapwise::AlgorithmId;
+use sapwise::algorithm::BackendClass;
 use sapwise::tuning::AlgorithmCost;
 use sapwise_tune::Model;
 use sapwise_tune::model::MethodModel;
@@ -31,6 +32,10 @@ pub(super) struct Material<'a> {
     outcomes: Vec<Vec<RoleOutcome>>,
     /// What machines are compared by, of each profile.
     likeness: Vec<Likeness>,
+    /// Whether each profile has timings on a real GPU.
+    on_gpu: Vec<bool>,
+    /// Each of these without its GPUs, when it is first needed.
+    on_cpu: Vec<OnceLock<(Profile, RegretTable)>>,
 }
 
 /// What folds share in which the same scenario is held out, or none.
@@ -52,6 +57,8 @@ pub(super) struct Fitted<'a> {
     /// The model with its residual, and without; `None` when none could be fitted.
     models: Option<(Model, Model)>,
     forests: Forests,
+    /// Whether the training has timings on a real GPU.
+    knows_gpus: bool,
     pub(super) notes: Vec<String>,
 }
 
@@ -77,6 +84,8 @@ impl<'a> Material<'a> {
             regrets: profiles.iter().map(|_| OnceLock::new()).collect(),
             outcomes: profiles.par_iter().map(role_outcomes).collect(),
             likeness: profiles.iter().map(|p| Likeness::new(&p.hardware)).collect(),
+            on_gpu: profiles.iter().map(Profile::has_real_gpu).collect(),
+            on_cpu: profiles.iter().map(|_| OnceLock::new()).collect(),
         }
     }
 
@@ -110,9 +119,25 @@ impl<'a> Material<'a> {
             always: known.iter().map(|&k| (&self.profiles[k], always(k))).collect(),
             models,
             forests: self.table.grow(&chosen, left_out)?,
+            knows_gpus: (0..chosen.len()).any(|k| chosen[k] && self.on_gpu[k]),
             known,
             notes,
         })
+    }
+
+    /// Returns a profile as a fold judges it, and what each choice costs on it: without its GPUs if no machine of the
+    /// training has a real one. A real GPU that software adapters predict shows nothing.
+    pub(super) fn judged(&self, k: usize, fitted: &Fitted<'_>) -> (&Profile, &RegretTable) {
+        if fitted.knows_gpus || !self.on_gpu[k] {
+            return (&self.profiles[k], self.regret_table(k));
+        }
+        let (profile, table) = self.on_cpu[k].get_or_init(|| {
+            let mut profile = self.profiles[k].clone();
+            profile.retain(|t| t.id.backend().class() == BackendClass::Cpu);
+            let table = RegretTable::new(&profile);
+            (profile, table)
+        });
+        (profile, table)
     }
 
     /// Returns what each choice costs on a profile.

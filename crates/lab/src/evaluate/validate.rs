@@ -127,12 +127,16 @@ struct Found {
 fn held_out(data: &Material<'_>, seen: &Seen<'_>, fitted: &Fitted<'_>, judged: &[usize]) -> Result<Found> {
     let mut found = Found { notes: fitted.notes.clone(), ..Found::default() };
     for &held in judged {
-        let profile = &data.profiles[held];
+        let (profile, table) = data.judged(held, fitted);
+        if profile.algorithms.len() < data.profiles[held].algorithms.len() {
+            found.notes.push(format!("{} is judged without its GPU: no other host has a real one", profile.file));
+        }
         let ours = fitted.predict(profile, &mut found.notes);
         let available = profile.available();
         let contestants = fitted.contestants(data, held, ours.as_ref(), &available)?;
         let costs = ours.as_ref().map(|o| &o.whole[..]);
-        let measured = MeasuredCrossovers::of_scenarios(profile, seen.costs(held));
+        let own = seen.costs(held).iter().filter(|c| available.contains(&c.algorithm));
+        let measured = MeasuredCrossovers::of_scenarios(profile, &own.cloned().collect::<Vec<_>>());
         if let Some(costs) = costs {
             for own in &measured {
                 let (file, scenario) = (&profile.file, &own.scenario);
@@ -143,7 +147,7 @@ fn held_out(data: &Material<'_>, seen: &Seen<'_>, fitted: &Fitted<'_>, judged: &
         }
         let means = RegretTable::by_means(profile);
         let regret = |contestant: Contestant<'_>| {
-            let regret = data.regret_table(held).regret(profile, &contestant.choose);
+            let regret = table.regret(profile, &contestant.choose);
             let by_means = Some(means.regret(profile, &contestant.choose));
             let crossings = contestant.costs.map(|costs| measured.iter().flat_map(|m| m.errors(&costs)).collect());
             Judged { by_means, ..Judged::new(contestant.name, profile, regret, crossings) }
@@ -182,11 +186,11 @@ fn unseen(
             let fitted = data.fit(fold, &seen)?;
             let mut regrets = Vec::new();
             for k in held {
-                let profile = &data.profiles[k];
+                let (profile, table) = data.judged(k, &fitted);
                 let ours = fitted.predict(profile, &mut Vec::new());
                 let available = profile.available();
                 for c in fitted.contestants(data, k, ours.as_ref(), &available)? {
-                    let regret = data.regret_table(k).regret_in(Some(scenario), profile, &c.choose);
+                    let regret = table.regret_in(Some(scenario), profile, &c.choose);
                     regrets.push(((profile.file.clone(), c.name), regret));
                 }
             }

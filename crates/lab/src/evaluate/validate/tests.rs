@@ -3,6 +3,9 @@ use crate::evaluate::scores::RUNNING;
 use crate::evaluate::{OURS, SINGLE_BEST};
 use crate::progress::Silent;
 use crate::synthetic::{Machine, profiles};
+use sapwise::AlgorithmId;
+use sapwise::algorithm::BackendClass;
+use sapwise_tune::GpuKind;
 
 fn validated(profiles: &[Profile]) -> (Validation, Vec<String>) {
     let partition = Partition::new(profiles);
@@ -66,6 +69,33 @@ fn machines_with_and_without_gpus_are_validated_together() {
         assert!(mean(&validation, name) < 0.1, "{name}: {} {notes:?}", mean(&validation, name));
     }
     assert!(mean(&validation, "physics") < mean(&validation, SINGLE_BEST));
+}
+
+#[test]
+fn a_real_gpu_is_judged_only_if_the_training_has_one() {
+    let mut machines = Machine::family_with_gpus();
+    machines.truncate(4);
+    let judged = |machines: &[Machine]| {
+        let all = profiles(machines.iter().cloned());
+        let found = validate(&all, &Designs::new(&all), &Partition::new(&all), &Silent).unwrap();
+        let on_gpu = |id: &AlgorithmId| id.backend().class() == BackendClass::Gpu;
+        let crossed =
+            found.held_out.crossovers.iter().filter(|c| on_gpu(&c.compared.below) || on_gpu(&c.compared.above));
+        let files: BTreeSet<String> = crossed.map(|c| c.file.clone()).collect();
+        let told = found.notes.iter().filter(|n| n.contains("is judged without its GPU")).count();
+        (files.len(), told, mean(&found.validation, OURS), found.validation.coverage.unwrap())
+    };
+    let (files, told, ..) = judged(&machines);
+    assert!(files > 1 && told == 0, "{files} {told}");
+    machines[3].gpus.clear();
+    machines[0].gpus.clear();
+    // The other one has a software adapter.
+    machines[1].gpus.iter_mut().for_each(|gpu| gpu.kind = GpuKind::Software);
+    let (files, told, regret, coverage) = judged(&machines);
+    // The one with the adapter is judged by a model of the real GPU.
+    assert!(files <= 1 && told == 1 && regret < 0.1, "{files} {told} {regret}");
+    machines.iter_mut().for_each(|m| m.gpus.clear());
+    assert!((judged(&machines).3.times_90_ln - coverage.times_90_ln).abs() < 0.1, "{coverage:?}");
 }
 
 #[test]
