@@ -210,4 +210,6 @@ fn unseen(
 }
 
 #[cfg(test)]
+mod reference;
+#[cfg(test)]
 mod tests;
