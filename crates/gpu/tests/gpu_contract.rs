@@ -180,6 +180,30 @@ fn millions_of_pairs_come_whole_and_a_limit_refuses_them() {
     }
 }
 
+/// Returns boxes of which the last overlaps the one before it and the first of the middle tile, and no others overlap.
+fn two_pairs_of_the_last_tile(objects: u32) -> (Vec<Aabb>, [(u32, u32); 2]) {
+    let (middle, last) = (objects.div_ceil(128) / 2 * 128, objects - 1);
+    let mut boxes: Vec<Aabb> = (0..objects).map(|k| Aabb::cube([k as f32, 9.0, 0.0], 0.2)).collect();
+    for k in [middle, last - 1] {
+        boxes[k as usize] = Aabb::cube([k as f32, 0.0, 0.0], 0.2);
+    }
+    boxes[last as usize] = Aabb::new([0.0; 3], [objects as f32, 0.1, 0.1]);
+    (boxes, [(middle, last), (last - 1, last)])
+}
+
+/// Their number of tile pairs is a power of two beyond a multiple of 4096, the counts that are summed together.
+#[test]
+fn brute_force_finds_the_pairs_of_the_last_tile() {
+    let Some(gpus) = gpus() else { return };
+    let sizes: &[u32] =
+        if cfg!(feature = "long-tests") { &[16_258, 16_384, 32_642, 32_768] } else { &[16_258, 16_384] };
+    for &objects in sizes {
+        let (boxes, expected) = two_pairs_of_the_last_tile(objects);
+        let mut brute = vec![("brute".to_owned(), broad_phase("brute", vec![gpus.open(0).unwrap()]).unwrap())];
+        assert_all_find(&expected, &format!("{objects} boxes"), &boxes, &mut brute);
+    }
+}
+
 #[test]
 fn the_order_is_the_same_in_every_run() {
     let Some(gpus) = gpus() else { return };

@@ -1,6 +1,7 @@
 use super::{Engine, Pending};
 use crate::kernel::dispatched;
-use crate::{Failure, Gpus, Header, Look, Output, Params, first_for_tests};
+use crate::{Failure, Gpus, Header, Look, Output, Params, Storage, first_for_tests, words_for_tests};
+use bytemuck::{bytes_of, cast_slice};
 use pollster::block_on;
 use sapwise::Aabb;
 use sapwise::algorithm::FramePlan;
@@ -77,7 +78,7 @@ fn resident_pairs_of_several_submissions_are_contiguous() {
     let Some(gpu) = first_for_tests() else { return };
     let boxes = crowded();
     let expected = oracle(&boxes);
-    let contents = bytemuck::cast_slice(&boxes);
+    let contents = cast_slice(&boxes);
     let usage = wgpu::BufferUsages::STORAGE;
     let buffer = gpu.device().create_buffer_init(&wgpu::util::BufferInitDescriptor { label: None, contents, usage });
     for method in SORTING {
@@ -96,20 +97,40 @@ fn resident_pairs_of_several_submissions_are_contiguous() {
 
 /// Returns the pairs that stayed on the GPU, sorted.
 fn pairs_on_cpu(engine: &Engine, count: u32) -> Vec<(u32, u32)> {
-    let size = u64::from(count) * 8;
-    let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
-    let descriptor = wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false };
-    let copy = engine.gpu.device().create_buffer(&descriptor);
-    let mut encoder = engine.gpu.record();
-    encoder.copy_buffer_to_buffer(engine.pairs_buffer(), 0, &copy, 0, size);
-    let submission = engine.gpu.submit(encoder).unwrap();
-    copy.map_async(wgpu::MapMode::Read, .., |_| {});
-    engine.gpu.wait(submission).unwrap();
-    let view = copy.get_mapped_range(..).unwrap();
-    let list: &[[u32; 2]] = bytemuck::cast_slice(&view);
-    let mut pairs: Vec<(u32, u32)> = list.iter().map(|&[i, j]| (i, j)).collect();
+    let list = words_for_tests(&engine.gpu, engine.pairs_buffer(), 2 * count);
+    let mut pairs: Vec<(u32, u32)> = list.chunks(2).map(|pair| (pair[0], pair[1])).collect();
     pairs.sort_unstable();
     pairs
+}
+
+/// The position behind the last block ends the pairs of that block.
+#[test]
+fn positions_of_any_number_of_blocks_are_the_sums_before_them() {
+    let Some(gpu) = first_for_tests() else { return };
+    let write = |to: &wgpu::Buffer, bytes: &[u8]| gpu.queue().write_buffer(to, 0, bytes);
+    let mut output = Output::new(&gpu).unwrap();
+    output.ensure_blocks(&gpu, 1 << 14).unwrap();
+    let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
+    let mut params = Storage::with_usage(&gpu, "parameters", usage).unwrap();
+    params.ensure(&gpu, size_of::<Params>() as u64).unwrap();
+    let header = Storage::new(&gpu, "header").unwrap();
+    output.bind(&gpu, params.buffer(), header.buffer()).unwrap();
+    let near = |blocks: u32| blocks - 1..=blocks + 1;
+    // 16 counts for each of 256 invocations.
+    for blocks in (0..=8).flat_map(|k| near(16 << k).chain(near(8192 + (16 << k)))).chain([0, 1, 48, 12_288]) {
+        let counts: Vec<u32> = (0..blocks).map(|k| (k * 7 + 1) % 5).collect();
+        write(params.buffer(), bytes_of(&Params { blocks, ..Params::default() }));
+        // What an earlier frame left behind the counts.
+        write(output.sums(), cast_slice(&[0xdead_beef_u32; 1 << 14]));
+        write(output.sums(), cast_slice(&counts));
+        let mut encoder = gpu.record();
+        output.record(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()));
+        gpu.submit(encoder).unwrap();
+        let sums = |end: u32| counts[..end as usize].iter().sum::<u32>();
+        let expected: Vec<u32> = (0..=blocks).map(sums).collect();
+        assert!(words_for_tests(&gpu, output.sums(), blocks + 1) == expected, "{blocks} blocks");
+        assert_eq!(words_for_tests(&gpu, header.buffer(), 2), [sums(blocks), 0], "{blocks} blocks");
+    }
 }
 
 /// Each dispatch waits for the previous one: a frame of few boxes takes as long as its dispatches.

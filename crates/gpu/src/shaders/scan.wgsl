@@ -24,8 +24,8 @@ fn positions(@builtin(local_invocation_index) t: u32) {
     // The position behind the last block is the number of pairs.
     for (var first = 0u; first <= params.blocks; first += THREADS * EACH) {
         let begin = first + t * EACH;
-        // Invocations with a block.
-        let count = clamp((params.blocks - first + EACH - 1u) / EACH, 1u, THREADS);
+        // Invocations with a block, or with the position behind the last one.
+        let count = clamp((params.blocks - first) / EACH + 1u, 1u, THREADS);
         var counts: array<vec4u, EACH / 4u>;
         var own = vec2u();
         for (var k = 0u; k < EACH / 4u; k++) {
