@@ -122,7 +122,9 @@ pub(crate) fn assert_each_names_the_first_invalid(algorithms: Algorithms, count:
                 (BoxDefect::NotANumber, Aabb::new([0.0, 0.0, f32::NAN], [1.0; 3])),
                 (BoxDefect::NotANumber, Aabb::new([0.0; 3], [f32::NAN, 1.0, 1.0])),
                 (BoxDefect::NotANumber, Aabb::new([f32::NAN; 3], [f32::NAN; 3])),
+                (BoxDefect::Inverted, Aabb::new([29.0, 0.0, 0.0], [1.0; 3])),
                 (BoxDefect::Inverted, Aabb::new([0.0, 2.0, 0.0], [1.0; 3])),
+                (BoxDefect::Inverted, Aabb::new([0.0, 0.0, 29.0], [1.0; 3])),
                 (BoxDefect::Inverted, Aabb::new([29.0; 3], [1.0; 3])),
             ] {
                 let mut boxes = random.cubes(count, [30.0; 3], 0.5);

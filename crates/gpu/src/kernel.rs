@@ -76,9 +76,9 @@ impl Kernel {
             int_div_checks: false,
             ..Default::default()
         };
-        // SAFETY: the texts are part of this program. An index depends on a box only through a clamp, each buffer is
-        // as long as its kernels need it for the parameters of the frame (`ensure` of its owner), every loop ends,
-        // and no divisor is zero.
+        // SAFETY: the texts are part of this program. An index depends on a box, valid or not, only through a clamp or
+        // the distance from one clamped cell to a later one. Each buffer is as long as its kernels need it for the
+        // parameters of the frame (`ensure` of its owner), every loop ends, and no divisor is zero.
         unsafe { Self::make(gpu, source.concat(), entry, &[], checks) }
     }
 

@@ -188,3 +188,60 @@ impl Search for Sorted {
         &self.pairing
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Header, first_for_tests, words_for_tests};
+    use bytemuck::{bytes_of, cast_slice};
+    use sapwise::Aabb;
+    use sapwise::internals::SampledBoxes;
+
+    /// The kernels search before the host hears of an invalid box, and index without checks.
+    #[test]
+    fn no_box_reaches_beyond_its_strip() {
+        let Some(gpu) = first_for_tests() else { return };
+        let place = |k: usize| [k % 12, k / 12 % 12, k / 144].map(|v| v as f32);
+        let mut boxes: Vec<Aabb> = (0..1728).map(|k| Aabb::cube(place(k), 0.4)).collect();
+        let (nan, minus_nan) = (f32::NAN, f32::from_bits(f32::NAN.to_bits() | 1 << 31));
+        for (k, (min, max)) in [(11.0, 0.0), (nan, 0.0), (11.0, minus_nan), (nan, minus_nan)].into_iter().enumerate() {
+            for axis in 0..3 {
+                (boxes[100 * k + axis].min[axis], boxes[100 * k + axis].max[axis]) = (min, max);
+            }
+        }
+        let sane: Vec<Aabb> = boxes[900..].to_vec();
+        let params = Params::grid_sap(&Look::at(&SampledBoxes::from(&sane[..])), boxes.len() as u32);
+        let mut sorted = Sorted::new(&gpu, Kind::GridSap).unwrap();
+        let mut output = Output::new(&gpu).unwrap();
+        output.ensure_blocks(&gpu, sorted.blocks(params.objects) as u32).unwrap();
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
+        let buffer = |bytes: &[u8]| {
+            let mut storage = Storage::with_usage(&gpu, "input", usage).unwrap();
+            storage.ensure(&gpu, bytes.len() as u64).unwrap();
+            gpu.queue().write_buffer(storage.buffer(), 0, bytes);
+            storage
+        };
+        let ids = Storage::new(&gpu, "numbers of boxes").unwrap();
+        let [of_params, of_boxes, header] =
+            [bytes_of(&params), cast_slice(&boxes), bytes_of(&Header::START)].map(buffer);
+        let inputs = Inputs {
+            params: of_params.buffer(),
+            boxes: of_boxes.buffer(),
+            ids: ids.buffer(),
+            header: header.buffer(),
+            memberships: None,
+        };
+        sorted.ensure(&gpu, &params).unwrap();
+        sorted.bind(&gpu, &inputs, &output).unwrap();
+        let mut encoder = gpu.record();
+        sorted.clear(&mut encoder, &params);
+        sorted.record_sort(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()), &params);
+        gpu.submit(encoder).unwrap();
+        let Order::Cells(cells) = &sorted.order else { panic!("grid-sap sorts by cells") };
+        for (k, key) in words_for_tests(&gpu, cells.unsorted()[0], 2 * params.objects).chunks(2).enumerate() {
+            let (cell, reach) = (key[0], key[1] & 0x3fff_ffff);
+            let last = if cell < params.large_key { cell % params.slots + reach } else { reach };
+            assert!(last < params.slots, "box {k} in cell {cell} of {} reaches {reach} further", params.slots);
+        }
+    }
+}

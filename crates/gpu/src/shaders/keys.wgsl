@@ -61,11 +61,13 @@ fn cell_keys(
     let x = cells_of(at, 0u);
     let y = cells_of(at, 1u);
     let z = cells_of(at, 2u);
-    // Some differences of an inverted box are huge; such a box is reported.
     let more = vec3u(x.y - x.x, y.y - y.x, z.y - z.x);
     var key = (z.x * params.cells.x + y.x) * params.slots + x.x;
     var reach = more.x | (more.y << 30u) | (more.z << 31u);
-    let is_long = more.x > 16u && tame(bound(at, 1u, 0u)) - tame(bound(at, 0u, 0u)) > params.longest;
+    // An inverted box, or one with a NaN, may end before it begins. It is reported, but searched first: its reach would
+    // lie outside the table. On the other two axes the difference is huge.
+    let is_long =
+        x.y < x.x || (more.x > 16u && tame(bound(at, 1u, 0u)) - tame(bound(at, 0u, 0u)) > params.longest);
     if (is_long || more.y > 1u || more.z > 1u) {
         key = params.large_key + (curve(at) >> params.curve_shift);
         reach = 0u;
