@@ -13,7 +13,7 @@ use crate::broad_phase::{FrameKind, FrameWork};
 use crate::cost::{Places, Residual};
 use crate::load::Load;
 use crate::tuning::tangents::Tangents;
-use crate::tuning::{AlgorithmCost, Tuning};
+use crate::tuning::{AlgorithmCost, Step, Tuning};
 use std::sync::Arc;
 
 /// If the number of objects alone decides, the incumbent stays while its own step is within this share.
@@ -99,8 +99,8 @@ pub(super) struct Policy {
     tangents: Tangents,
     classes: Vec<Part>,
     kept: Vec<Kept>,
-    /// The candidate of each step.
-    steps: Vec<usize>,
+    /// The first number of objects and the candidate of each step whose algorithm is a candidate, ascending.
+    steps: Vec<(u32, usize)>,
     learns: bool,
     explores: bool,
     /// Observed epochs, and surprises in a row, counted with their sign.
@@ -142,12 +142,13 @@ impl Policy {
             mean_ns: 0.0,
             saved_ns: 0.0,
         });
+        let step = |s: &Step| Some((s.from_objects, ids.iter().position(|id| **id == s.algorithm)?));
         let mut made = Self {
             candidates: candidates.collect(),
             classes: vec![Part::new(CLASS_LN); classes.len()],
             tangents: Tangents::new(tuning.costs.len()),
             kept: states(kept),
-            steps: tuning.steps.iter().filter_map(|s| ids.iter().position(|id| **id == s.algorithm)).collect(),
+            steps: tuning.steps.iter().filter_map(step).collect(),
             learns: true,
             explores: true,
             observed: 0,
@@ -217,7 +218,7 @@ impl Policy {
 
     /// Whether the number of objects tells the algorithm of a first frame.
     pub(super) fn has_steps(&self) -> bool {
-        self.steps.iter().any(|&k| self.candidates[k].usable)
+        self.steps.iter().any(|&(_, k)| self.candidates[k].usable)
     }
 
     /// Whether the number of objects alone decides.
@@ -535,16 +536,14 @@ impl Policy {
 
     /// The step that holds at this number of objects, or the nearest below or above that can run.
     fn choose_by_count(&mut self, objects: u32) -> Option<Choice> {
-        let steps = &self.tuning.steps;
-        let split = steps.partition_point(|s| s.from_objects <= objects);
-        let (below, above) = self.steps.split_at(split);
-        let mut leaders = below.iter().rev().chain(above).map(|&k| self.candidates[k].leader);
+        let begun = |objects: u32| self.steps.partition_point(|&(from, _)| from <= objects);
+        let (below, above) = self.steps.split_at(begun(objects));
+        let mut leaders = below.iter().rev().chain(above).map(|&(_, k)| self.candidates[k].leader);
         let chosen = leaders.find(|&k| self.candidates[k].usable)?;
         // Only the incumbent's own borders have a slack.
         let holds = |incumbent: usize, share: f64| {
-            let scaled = (f64::from(objects) * share) as u32;
-            let step = steps.partition_point(|s| s.from_objects <= scaled).checked_sub(1);
-            step.is_some_and(|k| self.steps[k] == incumbent)
+            let step = begun((f64::from(objects) * share) as u32).checked_sub(1);
+            step.is_some_and(|k| self.steps[k].1 == incumbent)
         };
         let (chosen, reason) = match self.incumbent {
             None if self.ran.is_none() => (chosen, Reason::First),

@@ -84,6 +84,24 @@ fn hand_written_thresholds_decide_by_count() {
     assert_eq!(chosen(&mut adaptive, 1000), ("grid-sap@cpu1".to_owned(), Reason::Switched));
 }
 
+#[test]
+fn steps_whose_algorithm_has_no_cost_are_passed_over() {
+    let step = |from_objects, id: &str| Step { from_objects, algorithm: id.parse().unwrap() };
+    let with_steps = |steps: [(u32, &str); 3]| {
+        let mut tuning = tuning(&[("brute@cpu1", 0.0, 10.0), ("pair-cache@cpu1", 1000.0, 5.0)]);
+        tuning.steps = steps.map(|(from, id)| step(from, id)).to_vec();
+        tuning
+    };
+    let tuning = with_steps([(0, "brute@cpu1"), (60, "octree@cpu1"), (200, "pair-cache@cpu1")]);
+    for (objects, expected) in [(10, "brute@cpu1"), (100, "brute@cpu1"), (500, "pair-cache@cpu1")] {
+        assert_eq!(chosen(&mut fixed(tuning.clone()), objects).0, expected, "{objects} objects");
+    }
+    let tuning = with_steps([(0, "octree@cpu1"), (60, "pair-cache@cpu1"), (200, "brute@cpu1")]);
+    for (objects, expected) in [(10, "pair-cache@cpu1"), (100, "pair-cache@cpu1"), (500, "brute@cpu1")] {
+        assert_eq!(chosen(&mut fixed(tuning.clone()), objects).0, expected, "{objects} objects");
+    }
+}
+
 /// Works for a few frames, then is lost as a GPU can be.
 struct Fragile(u32);
 
