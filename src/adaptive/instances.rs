@@ -103,7 +103,7 @@ impl Instance {
         let Some(algorithm) = self.place.here() else {
             return Err(Error::Unavailable { algorithm: id.clone(), reason: Unavailable::FailedBefore });
         };
-        if let Some(left_at) = self.left_at.filter(|_| self.is_incremental) {
+        if let Some(left_at) = self.left_at.filter(|&left_at| self.is_incremental && left_at < frame) {
             algorithm.missed_frames(frame - left_at);
             // Should this frame fail, those up to it are told.
             self.left_at = Some(frame);

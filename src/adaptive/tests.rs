@@ -136,8 +136,9 @@ fn a_lost_algorithm_is_replaced_within_the_frame() {
 struct Told(Arc<AtomicU64>);
 
 impl BroadPhase for Told {
-    fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+    fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
         pairs.clear();
+        Aabb::check(boxes, 0)?;
         pairs.finish()
     }
 
@@ -146,6 +147,7 @@ impl BroadPhase for Told {
     }
 
     fn missed_frames(&mut self, frames: u64) {
+        assert!(frames > 0);
         self.0.fetch_add(frames, Ordering::Relaxed);
     }
 }
@@ -190,6 +192,17 @@ fn one_that_keeps_work_is_told_how_many_frames_it_missed() {
         (0..50).for_each(|_| _ = chosen(&mut adaptive, objects));
     }
     assert_eq!(told.load(Ordering::Relaxed), 100);
+    // A frame that fails is told of those before it, and the next one of none.
+    (0..50).for_each(|_| _ = chosen(&mut adaptive, 10));
+    let mut boxes = row(1000);
+    boxes[999].min[0] = f32::NAN;
+    for _ in 0..3 {
+        let error = adaptive.find_pairs(&boxes, &mut Pairs::new()).unwrap_err();
+        assert!(matches!(error, Error::InvalidBox { index: 999, .. }), "{error}");
+        assert_eq!(told.load(Ordering::Relaxed), 150);
+    }
+    assert_eq!(chosen(&mut adaptive, 1000).0, "told@cpu1");
+    assert_eq!(told.load(Ordering::Relaxed), 150);
 }
 
 #[test]
