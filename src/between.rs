@@ -67,7 +67,7 @@ impl Between {
         let ((few, of_few), (many, of_many)) =
             if a.len() <= b.len() { ((a, 0), (b, second)) } else { ((b, second), (a, 0)) };
         let compares = few.len() <= FEW;
-        let work = if compares { few.len() * many.len() / COMPARED } else { a.len() + b.len() };
+        let work = if compares { few.len().saturating_mul(many.len()) / COMPARED } else { a.len() + b.len() };
         let Self { workers, simd, columns, tree, outputs } = self;
         let workers = &workers.fit(work);
         let _frame = workers.frame()?;
