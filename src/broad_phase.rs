@@ -42,7 +42,8 @@ pub trait BroadPhase: Send + Sync {
     ///
     /// # Errors
     /// [`Error::InvalidBox`] names the first box with a NaN or inverted bound. [`Error::TooManyObjects`],
-    /// [`Error::TooManyPairs`] and [`Error::OutOfMemory`] as they say. After an error the next call starts afresh.
+    /// [`Error::TooManyPairs`] and [`Error::OutOfMemory`] as they say. [`Error::Unavailable`] if a GPU is lost or the
+    /// system refuses threads. After an error the next call starts afresh.
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error>;
 
     /// Does the same as [`find_pairs`](Self::find_pairs), and reuses what the caller knows about this frame.

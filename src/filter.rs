@@ -67,9 +67,9 @@ impl Default for Membership {
 /// - `sap` and GPUs drop every unwanted pair as they find it. A GPU gets a changed filter once, 16 bytes for each
 ///   membership.
 ///
-/// A filter takes 17 bytes for each box. `bvh` and `pair-cache` take 17 more for each box if that set alone does not
-/// rule out all unwanted pairs. The first frame after a change of the filter finds that set in one pass over the
-/// memberships.
+/// A filter takes 17 bytes for each box, and 16 more in `pair-cache`, which keeps the memberships of the previous
+/// frame. `bvh` and `pair-cache` take another 17 if that set alone does not rule out all unwanted pairs. The first
+/// frame after a change of the filter finds that set in one pass over the memberships.
 ///
 /// ```
 /// use sapwise::{Filter, Membership};

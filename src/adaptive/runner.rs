@@ -29,7 +29,7 @@ pub(super) struct Runner {
     steady: bool,
     /// Another tuning may arrive before any frame.
     awaits: bool,
-    /// The instance that ran last; `None` before the first frame and after a failure.
+    /// The instance whose frame succeeded last; `None` before the first one of these instances.
     running: Option<usize>,
     instances: Vec<Instance>,
     /// Nanoseconds of the last frame if it was timed, and its work if it is incremental.
@@ -164,7 +164,7 @@ impl Runner {
         if self.steady && !self.tracker.pace.is_due(objects) {
             return self.go_on(boxes, pairs);
         }
-        // A decision for another frame than this one is made again.
+        // A decision for another number of boxes is made again.
         if self.decided.take() != Some(boxes.len()) {
             if self.is_due(objects) {
                 self.choose(boxes);

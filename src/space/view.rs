@@ -171,6 +171,8 @@ impl View<'_> {
     /// Returns the `k` bodies whose boxes are nearest to a point, with their distances, the nearest first: 0 if the
     /// point is inside. Of several at the same distance, those with the lowest handles come first.
     ///
+    /// A distance is the root of a sum of squares in `f32`: above 1.8e19 it is infinite, below 2e-23 it is 0.
+    ///
     /// # Errors
     /// [`Error::InvalidRay`] if the point is not finite, and [`Error::OutOfMemory`].
     pub fn nearest(&self, point: [f32; 3], k: usize) -> Result<Vec<(Handle, f32)>, Error> {
