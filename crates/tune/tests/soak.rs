@@ -2,8 +2,8 @@
 //!
 //! `Adaptive` runs `fragmentation` at small sizes, and each frame is compared with the double loop. At random, a GPU is
 //! lost and comes back, pools change their size, frames fail, and the program restarts with what it has learned. Every
-//! fourth program starts from a cache whose files are damaged, truncated, replaced by
-//! folders or not writable. A run of a million frames takes minutes:
+//! third program starts from a cache whose files are damaged, truncated, replaced by folders or
+//! not writable. A run of a million frames takes minutes:
 //!
 //! ```sh
 //! SAPWISE_SOAK_FRAMES=1000000 cargo test -p sapwise-tune --test soak -- --nocapture
@@ -283,8 +283,9 @@ fn failures_lose_no_pair_and_leak_no_memory() {
     let mut lowest = isize::MAX;
     while tally.frames < frames {
         let length = (LIFE / 2 + below(&mut random, LIFE)).min(frames - tally.frames);
-        if below(&mut random, 4) == 0 {
-            kept.program(length, &mut random, &mut tally);
+        // In turns, so that a short run has enough of both. Most of what the second kind is for happens between programs.
+        if tally.starts % 3 == 2 {
+            kept.program(length.div_ceil(4), &mut random, &mut tally);
         } else {
             let learned = program(known, length, &mut random, &mut tally);
             // A program uses what the previous one has learned, unless it was deleted.
@@ -313,10 +314,10 @@ fn failures_lose_no_pair_and_leak_no_memory() {
         ("learned tuning", tally.learned),
     ] {
         // Otherwise the seed misses what this test is for.
-        assert!(times >= frames / 20_000, "{what}: {times} times in {frames} frames");
+        assert!(times >= (frames / 20_000).max(1), "{what}: {times} times in {frames} frames");
     }
     assert!(tally.ran.len() >= 6, "{:?}", tally.ran);
     let Tally { cached, probed, unreadable, unwritable, .. } = tally;
     let least = [cached, probed, unreadable, unwritable].into_iter().min();
-    assert!(least >= Some(frames / 100_000), "{tally:?}");
+    assert!(least >= Some((frames / 100_000).max(1)), "{tally:?}");
 }

@@ -14,17 +14,26 @@ pub(crate) struct Kept {
     folder: tempfile::TempDir,
     /// Files that were made unreadable, of which the next start has to tell.
     damaged: Vec<PathBuf>,
+    /// Number of programs that have kept a tuning, or failed to.
+    turns: u64,
+    cores: u32,
 }
 
 impl Kept {
     pub(crate) fn new() -> Self {
-        Self { folder: tempfile::tempdir().unwrap(), damaged: Vec::new() }
+        Self { folder: tempfile::tempdir().unwrap(), damaged: Vec::new(), turns: 0, cores: 1 }
     }
 
     /// One program from start to end. Then something happens to its file.
     pub(crate) fn program(&mut self, frames: u64, random: &mut Random, tally: &mut Tally) {
         let mut machine = Machine::new(random);
-        let occupied = below(random, 8) == 0;
+        // Three programs on as many cores, which have one file. The folder of the second is occupied.
+        if self.turns % 3 == 0 {
+            self.cores = machine.cores;
+        }
+        machine.cores = self.cores;
+        let occupied = self.turns % 3 == 1;
+        tally.starts += 1;
         let cache = self.folder.path().join(if occupied { "occupied/cache" } else { "cache" });
         // A file where the folder should be: it can be neither read nor made, as on a disk that can't be written.
         fs::write(self.folder.path().join("occupied"), "").unwrap();
@@ -49,6 +58,9 @@ impl Kept {
             assert!(left_out, "nothing is kept, and nothing was told: {setup:?}");
             return;
         };
+        // At times the third program finds the file as the first one left it.
+        let spared = self.turns % 6 == 0;
+        self.turns += 1;
         let told = setup.remarks.iter().any(|r| r.contains("is ignored"));
         match setup.origin {
             Origin::Cached => tally.cached += 1,
@@ -64,7 +76,7 @@ impl Kept {
             self.damaged.retain(|d| *d != file);
         }
         tally.unwritable += u64::from(saved.is_err());
-        if file.is_file() {
+        if file.is_file() && !spared {
             self.damage(&file, random);
         } else if file.is_dir() && below(random, 2) == 0 {
             // Nobody but the user clears this away.
