@@ -283,7 +283,7 @@ fn failures_lose_no_pair_and_leak_no_memory() {
     let mut lowest = isize::MAX;
     while tally.frames < frames {
         let length = (LIFE / 2 + below(&mut random, LIFE)).min(frames - tally.frames);
-        // In turns, so that a short run has enough of both. Most of what the second kind is for happens between programs.
+        // In turns, so that a short run has enough of both. What the second kind is for happens between its programs.
         if tally.starts % 3 == 2 {
             kept.program(length.div_ceil(4), &mut random, &mut tally);
         } else {

@@ -28,7 +28,7 @@ impl Kept {
     pub(crate) fn program(&mut self, frames: u64, random: &mut Random, tally: &mut Tally) {
         let mut machine = Machine::new(random);
         // Three programs on as many cores, which have one file. The folder of the second is occupied.
-        if self.turns % 3 == 0 {
+        if self.turns.is_multiple_of(3) {
             self.cores = machine.cores;
         }
         machine.cores = self.cores;
@@ -59,7 +59,7 @@ impl Kept {
             return;
         };
         // At times the third program finds the file as the first one left it.
-        let spared = self.turns % 6 == 0;
+        let spared = self.turns.is_multiple_of(6);
         self.turns += 1;
         let told = setup.remarks.iter().any(|r| r.contains("is ignored"));
         match setup.origin {
