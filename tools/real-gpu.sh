@@ -260,7 +260,8 @@ for name in "${tests[@]}"; do
     [ ! -x "$bin/$name" ] || step "$name" 60 "$bin/$name"
 done
 # A program that was built without the test would run none and succeed.
-step every_size 180 bash -c '"$1" --ignored --list | grep ": test$" && exec "$1" --ignored --nocapture' - "$bin/gpu_contract"
+step every_size 180 bash -c '"$1" --ignored --list | grep ": test$" && exec "$1" --ignored --nocapture' \
+    bash "$bin/gpu_contract"
 step dispatches 60 "$bin/gpu_bench" --bench --dispatches
 step gpu_bench 120 "$bin/gpu_bench" --bench
 [ ! -e gpu_bench.log ] || sed -n '/^[-|]/p' gpu_bench.log >bench.md
