@@ -27,9 +27,8 @@ const NO_GPUS: &str = " Not for GPUs.\n";
 /// Of a model with GPUs, after [`USE`].
 const GPUS: &str = "
 
-On GPUs the terms are round trips, dependent dispatches, bytes up and down, bytes moved within the memory of the
-GPU, tests, and the cycles that the CPU spends on boxes and pairs. Software adapters are used only if no real GPU was
-in the training.
+On GPUs the terms are round trips, dispatches, bytes moved, tests, and the CPU's cycles for boxes and pairs. Software
+adapters are used only if no real GPU was in the training.
 ";
 
 /// What the columns of the scores mean.
@@ -43,10 +42,10 @@ nearby is charged ten times the best.
   that counts.
 - **seen scenario**: only the host was held out. **least to largest**: of the hosts, in seen scenarios.
 - **one thread**, **several**: seen scenarios, by the threads of the report.
-- **by means**: judged by the mean over frames instead of the median, which includes rebuilds and interruptions.
+- **by means**: by the mean over frames, which includes rebuilds and interruptions.
 - **crossovers off by**: median distance between measured and predicted crossovers; *near* is within half an octave, a
   factor of 1.4 in objects. Counted if the algorithm below costs over 1.1 times the one above at twice the objects.
-- **over 10 %**: share of the cells in which the choice cost a tenth more than the best, or worse.
+- **over 10 %**: share of the cells with a regret over 10 %.
 - **floor**: the best of the same cell in a repeated run. **another run's full sweep** chooses by the costs of that
   run. Smaller differences say nothing.
 ";
