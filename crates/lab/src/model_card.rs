@@ -52,7 +52,7 @@ nearby is charged ten times the best.
 
 /// What the strategies are.
 const STRATEGIES: &str = "
-`physics + load` is what `predict` does, `physics` the same without the residual. `physics + load, running` chooses
+`physics + load` is what `predict` does, `physics` the same without the residual. `physics + load (running)` chooses
 among what a program runs: without `sap`, `grid-sap` and `bvh` on the CPU. `random forest` predicts times from load and
 parameters. `nearest machine` takes the measured costs of the most similar host, of all threads for all threads.
 `direct regression` is the paper's: crossovers as power laws of parameters, and a choice by the number of objects.

@@ -14,7 +14,7 @@ pub const SINGLE_BEST: &str = "single best";
 /// The strategy of `predict`.
 pub const OURS: &str = "physics + load";
 /// The same among the algorithms that a program runs unless it asks for others.
-pub(super) const RUNNING: &str = "physics + load, running";
+pub(super) const RUNNING: &str = "physics + load (running)";
 
 /// A crossover that is predicted within this many octaves is near: a factor of 1.4.
 const NEAR_OCTAVES: f64 = 0.5;
