@@ -2,9 +2,12 @@
 
 mod common;
 
-use common::{Algorithms, Random, assert_each_names_the_first_invalid, every_algorithm, large_boxes, naive, scenes};
+use common::{
+    Algorithms, Random, assert_each_finds, assert_each_names_the_first_invalid, every_algorithm, large_boxes,
+};
+use common::{naive, scenes};
 use sapwise::algorithm::SimdLevel;
-use sapwise::{Aabb, Error, PairOrder, Pairs};
+use sapwise::{Aabb, BroadPhase, Error, PairOrder, Pairs};
 use sapwise_scenes::Scenario;
 
 fn assert_all_agree(name: &str, boxes: &[Aabb], algorithms: &mut Algorithms) {
@@ -100,4 +103,23 @@ fn one_pair_beyond_the_limit_is_an_error() {
         algorithm.find_pairs(&boxes, &mut pairs).unwrap();
         assert_eq!(pairs.len(), 1_999_000, "{id}");
     }
+}
+
+/// Leaves the list of pairs as it is.
+struct Idle;
+
+impl BroadPhase for Idle {
+    fn find_pairs(&mut self, _: &[Aabb], _: &mut Pairs) -> Result<(), Error> {
+        Ok(())
+    }
+}
+
+#[test]
+#[should_panic(expected = "idle, two boxes: 2 pairs, not 1")]
+fn algorithm_that_writes_nothing_fails_the_contract() {
+    let mut algorithms = every_algorithm();
+    algorithms.truncate(1);
+    algorithms.push(("idle".to_owned(), Box::new(Idle)));
+    let mut pairs = Pairs::with_order(PairOrder::Canonical);
+    assert_each_finds(&[(0, 1)], &mut algorithms, &[Aabb::cube([0.0; 3], 1.0); 2], &mut pairs, "two boxes");
 }

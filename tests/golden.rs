@@ -86,6 +86,8 @@ fn assert_golden(frames: Frames, mut algorithms: Vec<(String, Box<dyn BroadPhase
         for (frame, boxes) in frames.of(scenario).enumerate() {
             let pairs = &mut orders[frame % 2];
             for ((id, algorithm), hash) in algorithms.iter_mut().zip(&mut hashes) {
+                // The previous algorithm left the right answer.
+                pairs.push(u32::MAX - 1, u32::MAX);
                 algorithm.find_pairs(&boxes, pairs).unwrap_or_else(|e| panic!("{id} on {scenario}: {e}"));
                 if pairs.order() == PairOrder::Canonical {
                     hash.pairs(pairs.as_slice());
