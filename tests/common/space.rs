@@ -147,6 +147,11 @@ impl Model {
         defect(b).map_or(Ok(()), |defect| Err(Error::InvalidBody { handle, defect }))
     }
 
+    /// Returns whether a body has another box than at the last update, or had none. It is active in the next one.
+    fn has_moved(&self, handle: &Handle) -> bool {
+        self.seen.get(handle) != self.bodies.get(handle).map(|(b, _)| b)
+    }
+
     fn update(&mut self) {
         let all: Vec<_> = self.bodies.iter().collect();
         let mut pairs = Vec::new();
@@ -327,11 +332,18 @@ impl Run<'_> {
         self.both(|space| space.set_limit(Some(limit)));
         let found = self.both(|space| space.update());
         self.both(|space| space.set_limit(None));
+        self.tests += self.model.bodies.len().pow(2);
+        let mut after = self.model.clone();
+        after.update();
         if found.is_ok() {
-            self.model.update();
+            let surely_active =
+                after.pairs.iter().filter(|(a, b)| self.model.has_moved(a) && self.model.has_moved(b)).count();
+            assert!(surely_active <= limit, "{surely_active} pairs of active bodies, more than {limit}");
+            self.model = after;
             return;
         }
         assert_eq!(found, Err(Error::TooManyPairs { limit }));
+        assert!(after.pairs.len() > limit, "no more than {limit} pairs: {}", after.pairs.len());
         assert!(self.spaces.iter().all(|space| space.begun().is_empty() && space.ended().is_empty()));
         match self.source.below(4) {
             0 | 1 => self.shift(),
