@@ -84,7 +84,7 @@ impl Pairs {
     /// A frame with more wanted pairs is [`Error::TooManyPairs`]. The built-in algorithms stop soon after the limit, so
     /// the number of pairs is unknown then. On `k` threads, `k` above 1, an algorithm may hold up to `8 k + 1` times
     /// the limit while it works, because each task has its own list. `pair-cache` also keeps up to 32 pairs for each
-    /// box, whatever the limit.
+    /// box, and memory for at most five times as many, whatever the limit.
     pub fn set_limit(&mut self, limit: Option<usize>) {
         self.limit = limit;
     }
@@ -184,6 +184,11 @@ impl Pairs {
         }
         self.buffer[self.len] = (a.min(b), a.max(b));
         self.len += 1;
+    }
+
+    /// Returns the number of pairs that the list has memory for.
+    pub(crate) fn capacity(&self) -> usize {
+        self.buffer.capacity()
     }
 
     /// Returns whether every wanted pair is stored.

@@ -9,6 +9,7 @@
 //!
 //! Verlet (Phys. Rev. 159, 1967) kept such lists of neighbours for molecules.
 
+mod budget;
 mod grown;
 mod motion;
 mod prices;
@@ -28,6 +29,7 @@ use crate::error::Error;
 use crate::load::{FramePlan, SceneStats};
 use crate::pairs::Pairs;
 use crate::registry::thread_counts;
+use budget::Budget;
 use grown::{Grown, Margin, Share};
 use motion::{Motion, Work};
 use sift::Sift;
@@ -158,12 +160,6 @@ impl BroadPhase for PairCache {
     }
 }
 
-/// Returns the most pairs that one of the lists of `tasks` tasks may keep: four equal shares of a task, because a dense
-/// place may lie in the part of one list.
-fn most_of_list(most_kept: usize, tasks: usize) -> usize {
-    (most_kept / tasks).saturating_mul(4).min(most_kept)
-}
-
 impl PairCache {
     /// Notes the number of boxes, until it changes by a factor of two. Then the cost of a box is unknown, and nothing is
     /// kept.
@@ -219,12 +215,14 @@ impl PairCache {
             grown.grow_all(workers, boxes, motion.renew(plan, boxes, &changes), shares);
             let stats = SceneStats::of(grown.as_slice());
             tree.build(workers, grown.as_slice(), Members::From(0), &stats, pairs.screen())?;
-            let most = most_of_list(motion.most_kept(boxes.len()), workers.tasks());
-            for list in kept.iter_mut() {
-                list.clear();
-                list.set_limit(Some(most));
+            let most = motion.most_kept(boxes.len());
+            // Dense places move from list to list, and each list has grown to its largest.
+            if kept.iter().map(Pairs::capacity).sum::<usize>() > most + most / 4 {
+                kept.fill_with(Pairs::new);
             }
-            workers.each(kept, |k, list| tree.tree.self_pairs(k, parts, list));
+            kept.iter_mut().for_each(Pairs::clear);
+            let budget = Budget::new(most, workers.tasks(), 0);
+            workers.each(kept, |k, list| budget.fill(list, |list| tree.tree.self_pairs(k, parts, list)));
             if !kept.iter_mut().all(|list| list.is_complete() && list.reserve_some_more().is_ok()) {
                 return Ok(Kept::Incomplete);
             }
@@ -242,12 +240,13 @@ impl PairCache {
         let sift =
             Sift { boxes, grown, tree, parts, far: boxes.len() > FAR, nobody_left: changes.left == 0 || rebuilt };
         let looked = AtomicU64::new(0);
+        let budget = Budget::new(motion.most_kept(boxes.len()), workers.tasks(), kept.iter().map(Pairs::len).sum());
         let lists_of_task = parts.div_ceil(workers.tasks());
         outputs.collect(workers, pairs, |found| {
             let tasks = kept.chunks_mut(lists_of_task).zip((0..).step_by(lists_of_task)).zip(found);
             workers.each_of(tasks, |((lists, first), found)| {
-                let nodes = lists.iter_mut().zip(first..).map(|(list, k)| sift.list(k, list, found)).sum();
-                looked.fetch_add(nodes, Relaxed);
+                let sift = |(list, k)| budget.fill(list, |list| sift.list(k, list, found));
+                looked.fetch_add(lists.iter_mut().zip(first..).map(sift).sum(), Relaxed);
             });
             Ok(())
         })?;
@@ -270,6 +269,7 @@ mod tests {
     use crate::cpu::brute::double_loop;
     use crate::scene::{Scenario, Scene};
     use FrameKind::{FromScratch, Rebuilt, Updated};
+    use std::ops::Range;
 
     fn frames(scenario: Scenario, count: usize, plan: &FramePlan) -> Vec<FrameWork> {
         let mut method = pair_cache(1, &Threads::default(), Simd::Portable, false);
@@ -302,6 +302,47 @@ mod tests {
             let plan = FramePlan::default().with_moved(Some(0.0)).with_pairs(Some(0.0));
             method.find_pairs_with(&plan, &boxes, &mut pairs).unwrap();
             assert_eq!(pairs.len(), overlapping);
+        }
+    }
+
+    /// Returns a row of boxes that do not overlap, except those at the positions `together`, which are all alike.
+    fn row(objects: usize, at: f32, together: Range<usize>) -> Vec<Aabb> {
+        let mut boxes: Vec<Aabb> = (0..objects).map(|k| Aabb::cube([at + k as f32 * 3.0, 0.0, 0.0], 1.0)).collect();
+        let place = boxes.get(together.start).copied();
+        boxes[together].fill(place.unwrap_or(Aabb::cube([0.0; 3], 1.0)));
+        boxes
+    }
+
+    #[test]
+    fn memory_of_kept_pairs_is_bounded_when_boxes_come_together() {
+        // On one thread they have 25 lists.
+        let objects = 100_000;
+        let still = |pairs| FramePlan::default().with_moved(Some(0.0)).with_pairs(Some(pairs));
+        let held = |method: &PairCache| method.kept.iter().map(Pairs::capacity).sum::<usize>() / objects;
+        for threads in if cfg!(feature = "parallel") { 1..=2 } else { 1..=1 } {
+            let method = || pair_cache(threads, &Threads::default(), Simd::Portable, false);
+            let mut pairs = Pairs::new();
+            pairs.set_limit(Some(1000));
+            // If fewer than half leave their grown boxes, the tree is not built again.
+            for together in [0..objects, 0..objects / 3, objects / 2..objects] {
+                let mut method = method();
+                method.find_pairs_with(&still(0.0), &row(objects, 0.0, 0..0), &mut pairs).unwrap();
+                let found = method.find_pairs(&row(objects, 0.0, together.clone()), &mut pairs);
+                assert_eq!(found, Err(Error::TooManyPairs { limit: 1000 }), "{threads} threads, {together:?}");
+                assert!(held(&method) < 16, "{threads} threads, {together:?}: {} for each box", held(&method));
+            }
+            // A dense place with two pairs for each box, in one list after the other.
+            let mut method = method();
+            pairs.set_limit(None);
+            for k in 0..25 {
+                let dense = k * objects / 25..k * objects / 25 + 633;
+                let boxes = row(objects, (k % 2) as f32 * 1.5, dense);
+                for _ in 0..12 {
+                    method.find_pairs_with(&still(2e5), &boxes, &mut pairs).unwrap();
+                }
+                assert_eq!((pairs.len(), method.last_frame().kind), (633 * 632 / 2, Updated));
+                assert!(held(&method) < 25, "{threads} threads, place {k}: {} for each box", held(&method));
+            }
         }
     }
 

@@ -39,6 +39,10 @@ impl Sift<'_> {
         list.sift(found, |pair| grown.is_dirty(pair), fetch, overlap);
         let mut nodes = 0;
         for i in tree.moved(k, self.parts) {
+            // The frame is made again from scratch.
+            if !list.is_complete() {
+                break;
+            }
             nodes += u64::from(grown.meet(tree, i, |j| {
                 list.push(i, j);
                 if overlap((i, j)) {
