@@ -94,32 +94,27 @@ fn with_gpus(threads: Option<u32>, software: bool) -> Registry {
     registry
 }
 
-/// Returns the GPUs, which are found once in each process.
+/// Returns the GPUs, which are found once in each process. The search holds the interpreter's lock, so that no other
+/// thread forks meanwhile: the child would find this lock, the linker and the drivers in the middle of a search.
 #[cfg(feature = "gpu")]
 fn gpus() -> sapwise_gpu::Gpus {
     use sapwise_gpu::Gpus;
     use std::sync::{Mutex, PoisonError};
-    /// With the process that found them. Locked only by a thread with the interpreter's lock, and for an instant: no
-    /// fork finds it locked.
+    /// With the process that found them. Locked only by a thread with the interpreter's lock.
     static FOUND: Mutex<Option<(u32, Gpus)>> = Mutex::new(None);
-    let pid = std::process::id();
-    let found = || FOUND.lock().unwrap_or_else(PoisonError::into_inner);
-    let known = |of: &Option<(u32, Gpus)>| of.as_ref().filter(|(of, _)| *of == pid).map(|(_, gpus)| gpus.clone());
-    if let Some(gpus) = Python::try_attach(|_| known(&found())).flatten() {
-        return gpus;
-    }
-    let new = Gpus::find();
-    let first = Python::try_attach(|_| {
-        let mut found = found();
-        // Another thread may have found them meanwhile.
-        known(&found).unwrap_or_else(|| {
-            // After a fork. Dropping them would wait for a driver that is not in this process.
-            std::mem::forget(found.replace((pid, new.clone())));
-            new.clone()
-        })
-    });
-    // The interpreter may be shutting down.
-    first.unwrap_or(new)
+    let known = || {
+        let mut found = FOUND.lock().unwrap_or_else(PoisonError::into_inner);
+        let pid = std::process::id();
+        if let Some((_, gpus)) = found.as_ref().filter(|(of, _)| *of == pid) {
+            return gpus.clone();
+        }
+        let gpus = Gpus::find();
+        // After a fork. Dropping them would wait for a driver that is not in this process.
+        std::mem::forget(found.replace((pid, gpus.clone())));
+        gpus
+    };
+    // None while the interpreter shuts down.
+    Python::try_attach(|_| known()).unwrap_or_default()
 }
 
 #[cfg(not(feature = "gpu"))]

@@ -130,6 +130,32 @@ print('fine')
     assert run(HEAD + script).strip() == "fine"
 
 
+@forks
+@pytest.mark.parametrize("delay", [0.002, 0.02, 0.05])
+def test_a_fork_while_another_thread_looks_for_gpus(delay):
+    # Without GPUs in the wheel there is no such algorithm.
+    script = """
+import warnings; warnings.simplefilter('ignore')
+boxes = cubes(30)
+def search():
+    try: sapwise.pairs(boxes, algorithm='brute@gpu0')
+    except sapwise.SapwiseError: pass
+thread = threading.Thread(target=search); thread.start(); time.sleep(%s)
+child = os.fork()
+if child == 0:
+    sapwise.pairs(boxes)
+    os._exit(0)
+for _ in range(300):
+    ended, status = os.waitpid(child, os.WNOHANG)
+    if ended: break
+    time.sleep(0.1)
+else: os.kill(child, 9); sys.exit('the child waits for ever')
+assert status == 0, status
+thread.join(); print('fine')
+""" % delay
+    assert run(HEAD + script).strip() == "fine"
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="threads are counted by what Linux tells")
 @pytest.mark.parametrize("busy", [False, True])
 def test_a_fork_after_use_works_in_the_child_and_in_the_parent(busy):
