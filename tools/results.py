@@ -367,7 +367,7 @@ def stale_map():
 SHOWN = {
     "single best": "one fixed algorithm",
     "nearest machine": "most similar machine",
-    "physics + load": "Sapwise's prediction",
+    "physics + load (running)": "Sapwise's prediction",
 }
 
 
