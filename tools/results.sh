@@ -30,8 +30,12 @@ gpu() {
 }
 inline() {
   host
-  tools/inline.py "$SAPWISE_HOST" --report "datasets/$SAPWISE_HOST/full.json" --other datasets/amd-epyc-zen3-2c/full.json
-  note inline.csv inline "n = 4 repeats of 600 frames"
+  # The prediction is of a model that has not seen this host, where there is one.
+  local tuning=datasets/traces/$SAPWISE_HOST/predicted.tuning
+  [ -e "$tuning" ] || tuning=
+  tools/inline.py "$SAPWISE_HOST" --report "datasets/$SAPWISE_HOST/full.json" \
+    --other datasets/amd-epyc-zen3-2c/full.json --repeats 6 ${tuning:+--predicted "$tuning"}
+  note inline.csv inline "n = 6 repeats of 600 to 1200 frames"
 }
 c() { tools/c.sh bench; note c.csv c "medians over all frames"; }
 python() { tools/python.sh bench; note python.csv python "n = 3 to 200 samples"; }
