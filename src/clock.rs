@@ -40,7 +40,7 @@ pub(crate) fn elapsed_ns(since: Instant) -> f64 {
 }
 
 /// Returns whether the clock is fine enough to tell this time.
-pub(crate) fn tells(ns: f64) -> bool {
+fn tells(ns: f64) -> bool {
     tick().is_some_and(|tick| ns >= (FEWEST_TICKS * tick).as_nanos() as f64)
 }
 

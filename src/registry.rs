@@ -1,6 +1,8 @@
 //! The algorithms that this machine can run.
 
-use crate::algorithm::{Backend, BackendClass, MOST_THREADS};
+#[cfg(feature = "parallel")]
+use crate::algorithm::Backend;
+use crate::algorithm::{BackendClass, MOST_THREADS};
 use crate::cpu::{self, Made, Method, Simd, SimdLevel, Threads, Workers};
 use crate::entry::Entry;
 use crate::{AlgorithmId, BroadPhase, Error, Unavailable};

@@ -19,7 +19,7 @@ mod width;
 
 use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, FrameKind, FrameWork, check_count};
-use crate::clock::{Instant, measured_ns, tells};
+use crate::clock::{Instant, measured_ns};
 use crate::cpu::level::Simd;
 use crate::cpu::outputs::Outputs;
 use crate::cpu::tree::{FAR, Members, Upkeep};
@@ -43,8 +43,9 @@ const BOXES_PER_LIST: usize = 4096;
 /// The method; see the module.
 #[derive(Debug)]
 struct PairCache {
-    /// The workers for 1, 2, 4, ... and all threads.
-    widths: Vec<Workers>,
+    /// All workers, and the numbers of threads on which some of them run: 1, 2, 4, ... and all.
+    all: Workers,
+    widths: Vec<usize>,
     /// Those of the last frame, and the number of boxes by which they are chosen.
     workers: Workers,
     fitted_for: usize,
@@ -80,9 +81,8 @@ pub(super) fn create(threads: u32, pools: &Threads, simd: Simd) -> Made {
 
 /// `timed`: it decides by the clock.
 fn pair_cache(threads: u32, pools: &Threads, simd: Simd, timed: bool) -> PairCache {
-    let widths: Vec<Workers> = thread_counts(threads).map(|k| Workers::new("pair-cache", k, pools)).collect();
-    let widest = &widths[widths.len() - 1];
-    let tasks = widest.tasks();
+    let all = Workers::new("pair-cache", threads, pools);
+    let tasks = all.tasks();
     PairCache {
         outputs: Outputs::default(),
         motion: Motion::new(timed),
@@ -92,9 +92,10 @@ fn pair_cache(threads: u32, pools: &Threads, simd: Simd, timed: bool) -> PairCac
         shares: (0..tasks).map(|_| Share::default()).collect(),
         kept: vec![Pairs::new()],
         last_frame: FrameKind::FromScratch,
-        workers: widths[0].fit(0),
+        workers: all.fit(0),
         fitted_for: 0,
-        widths,
+        widths: thread_counts(threads).map(|k| k as usize).collect(),
+        all,
     }
 }
 
@@ -131,8 +132,10 @@ impl BroadPhase for PairCache {
         if kept == Kept::Incomplete {
             pairs.clear();
             let Self { workers, tree, upkeep, outputs, .. } = self;
-            let took = upkeep.find(&mut tree.tree, workers, (plan, boxes), outputs, pairs)?;
-            let took = Some(took).filter(|each| tells(each * boxes.len() as f64)).map(|each| each as f32);
+            upkeep.find(&mut tree.tree, workers, (plan, boxes), outputs, pairs)?;
+            // If keeping was tried in vain in this frame, it says nothing.
+            let took =
+                measured_ns(started).filter(|_| margin.is_none()).map(|ns| ns as f32 / boxes.len().max(1) as f32);
             self.motion.found_from_scratch(boxes.len(), pairs.overlapping(), took);
             self.last_frame = FrameKind::FromScratch;
         } else {
@@ -173,15 +176,14 @@ impl PairCache {
         // Keeping takes about half as long as finding from scratch.
         self.motion.resize([boxes / 2, boxes].map(|boxes| Width::new(self.position(boxes))));
         // Lists for all tasks of any width: another number of threads deals nothing out anew.
-        let tasks = self.widths[self.widths.len() - 1].fit(boxes).tasks();
+        let tasks = self.all.fit(boxes).tasks();
         self.kept.resize_with(tasks * boxes.div_ceil(tasks * BOXES_PER_LIST).max(1), Pairs::new);
     }
 
     /// Returns the position of the threads that a frame of `boxes` boxes keeps busy.
     fn position(&self, boxes: usize) -> usize {
-        let most = self.widths.len() - 1;
-        let threads = self.widths[most].fit(boxes).threads();
-        self.widths.iter().position(|w| w.threads() >= threads).unwrap_or(most)
+        let threads = self.all.fit(boxes).threads();
+        self.widths.partition_point(|&width| width < threads)
     }
 
     /// Returns the threads of the next frame.
@@ -189,7 +191,7 @@ impl PairCache {
         let most = self.position(self.fitted_for);
         let prices = &mut self.motion.prices;
         let width = if keeps { prices.keepers.next(most) } else { prices.searchers.next(most) };
-        self.widths[width].fit(self.fitted_for)
+        self.all.fit(self.fitted_for).at_most(self.widths[width])
     }
 
     /// Finds the pairs among the kept ones.

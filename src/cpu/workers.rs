@@ -91,12 +91,18 @@ impl Workers {
     /// Returns as many of these threads as a frame of `boxes` boxes keeps busy, with as many tasks. A method that takes
     /// more or less time for a box than `grid-sap` passes the number of boxes for which `grid-sap` takes as long.
     pub fn fit(&self, boxes: usize) -> Self {
-        let threads = self.threads.min(boxes / BOXES_PER_THREAD).max(1);
+        let fit = self.at_most((boxes / BOXES_PER_THREAD).max(1));
+        Self { tasks: fit.tasks.min((boxes / SMALLEST_TASK).max(1)), ..fit }
+    }
+
+    /// Returns at most this many of these threads, with as many tasks.
+    pub fn at_most(&self, threads: usize) -> Self {
+        let threads = self.threads.min(threads);
         Self {
             #[cfg(feature = "parallel")]
             method: self.method,
             threads,
-            tasks: if threads == 1 { 1 } else { (threads * TASKS_PER_THREAD).min(boxes / SMALLEST_TASK) },
+            tasks: if threads == 1 { 1 } else { (threads * TASKS_PER_THREAD).min(self.tasks) },
             #[cfg(feature = "parallel")]
             helpers: self.helpers.as_ref().filter(|_| threads > 1).map(Arc::clone),
         }

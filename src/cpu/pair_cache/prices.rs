@@ -92,11 +92,15 @@ impl Prices {
         }
         let took = took.unwrap_or(model);
         let cost = f64::from(took / model);
+        let before = self.of_scratch.get();
         if self.frames > FEWEST_FRAMES {
             self.of_scratch.add(cost);
         } else if counts {
-            self.of_scratch = MeanTime::of(self.of_scratch.get().map_or(cost, |least| least.min(cost)));
+            self.of_scratch = MeanTime::of(before.map_or(cost, |least| least.min(cost)));
         }
+        // A frame with kept pairs takes as long as before: the first frames after a build tell too little.
+        let over = before.zip(self.of_scratch.get()).map_or(1.0, |(before, now)| before / now);
+        self.keeping = MeanTime::of(self.keeping.get().unwrap_or(1.0) * over);
     }
 
     /// Returns whether a try of keeping boxes of this pace is worth it by what the model says. The clock ends a try
@@ -252,6 +256,20 @@ mod tests {
         assert_eq!([0.1, 0.01].map(|pace| begins_at(&prices, pace)), [36; 2]);
         prices.fade(10_000);
         assert_eq!(begins_at(&prices, 0.1), 39);
+    }
+
+    #[test]
+    fn a_failure_by_too_low_a_cost_from_scratch_is_soon_made_good() {
+        let mut prices = keeping();
+        // Soon after the build, frames from scratch took 50 ns a box. Those with kept pairs take 56, and promised 40.
+        while prices.pays(Some(56.0), 32.0, 40.0) {}
+        prices.failed(false);
+        assert!(!begins(&mut prices, 0.1, 32.0, 40.0));
+        let frames = (0..100).take_while(|_| {
+            prices.add_scratch(Some(90.0), 40.0);
+            !begins(&mut prices, 0.1, 32.0, 40.0)
+        });
+        assert!((1..12).contains(&frames.count()));
     }
 
     #[test]

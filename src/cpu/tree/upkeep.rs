@@ -70,8 +70,7 @@ impl Upkeep {
         self.tree = None;
     }
 
-    /// Adds the pairs of these boxes to `pairs`, with a tree that is refitted or built. Returns the nanoseconds that
-    /// this took for each box.
+    /// Adds the pairs of these boxes to `pairs`, with a tree that is refitted or built.
     ///
     /// # Errors
     /// Those of [`update`](Self::update), and of too many pairs.
@@ -82,24 +81,22 @@ impl Upkeep {
         (plan, boxes): (&FramePlan, &[Aabb]),
         outputs: &mut Outputs,
         pairs: &mut Pairs,
-    ) -> Result<f64, Error> {
+    ) -> Result<(), Error> {
         let input = Input { workers, boxes, screen: pairs.screen() };
-        let updating = self.update(tree, input, plan)?;
+        self.update(tree, input, plan)?;
         let started = Instant::now();
         outputs.find(workers, pairs, |k, parts, list| tree.self_pairs(k, parts, list));
-        let searching = each_ns(started, boxes.len());
-        self.search.add(searching);
-        Ok(updating + searching)
+        self.search.add(each_ns(started, boxes.len()));
+        Ok(())
     }
 
-    /// Refits or builds the tree of these boxes. Returns the nanoseconds that this took for each box, without those of
-    /// a refit in vain.
+    /// Refits or builds the tree of these boxes.
     ///
     /// # Errors
     /// [`Error::InvalidBox`] for the first invalid box, and [`Error::OutOfMemory`].
-    pub(crate) fn update(&mut self, tree: &mut Tree, input: Input<'_>, plan: &FramePlan) -> Result<f64, Error> {
-        if let Some(refit) = self.refitted(tree, input, plan) {
-            return Ok(refit);
+    pub(crate) fn update(&mut self, tree: &mut Tree, input: Input<'_>, plan: &FramePlan) -> Result<(), Error> {
+        if self.refitted(tree, input, plan).is_some() {
+            return Ok(());
         }
         let Input { workers, boxes, screen } = input;
         self.tree = None;
@@ -111,13 +108,12 @@ impl Upkeep {
         let longest = stats.ranges.map(|r| r.1).into_iter().fold(0.0, f64::max) as f32;
         let area = tree.half_area(longest) / boxes.len().max(1) as f64;
         self.tree = Some(Known { boxes: boxes.len(), area, longest, excess: 0.0, sum: 0.0 });
-        let build = each_ns(started, boxes.len());
-        self.build.add(build);
-        Ok(build)
+        self.build.add(each_ns(started, boxes.len()));
+        Ok(())
     }
 
-    /// Refits the tree if that pays, and returns the nanoseconds for each box. If not, the tree is of no use.
-    fn refitted(&mut self, tree: &mut Tree, input: Input<'_>, plan: &FramePlan) -> Option<f64> {
+    /// Refits the tree if that pays. If not, `None`: the tree is of no use.
+    fn refitted(&mut self, tree: &mut Tree, input: Input<'_>, plan: &FramePlan) -> Option<()> {
         let (mut known, boxes) = (self.tree?, input.boxes);
         let price = self.price();
         if self.pause > 0 {
@@ -141,12 +137,11 @@ impl Upkeep {
             self.next_pause = (2 * self.next_pause + 1).min(MOST_PAUSE);
             return None;
         }
-        let refit = each_ns(started, boxes.len());
-        self.refit.add(refit);
+        self.refit.add(each_ns(started, boxes.len()));
         self.next_pause = 0;
         (known.boxes, known.sum) = (boxes.len(), known.sum + known.excess);
         self.tree = Some(known);
-        Some(refit)
+        Some(())
     }
 
     /// Returns what a build costs over a refit, in searches.
