@@ -413,7 +413,7 @@ def page_of_heldout():
         "# Machines held out\n\n"
         "[Regret](../docs/methodology.md#regret-and-what-is-held-out) in percent (least–largest "
         "[host](regrets.csv)). *In games*: around 800 boxes. "
-        "`six-hosts`: commit 22f9246, older algorithms and baselines.\n\n"
+        "`six-hosts`: commit 22f9246, older algorithms.\n\n"
         + table(["model", "strategy", "unseen scenario", "in games", "seen scenario"], body)
         + "\nHosts measured after the model was committed, by profile:\n\n"
         + table(["host", "profile", "model", "regret (in games)"], judged)

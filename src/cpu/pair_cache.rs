@@ -164,8 +164,8 @@ impl BroadPhase for PairCache {
 }
 
 impl PairCache {
-    /// Notes the number of boxes, until it changes by a factor of two. Then the cost of a box is unknown, and nothing is
-    /// kept.
+    /// Notes the number of boxes, until it changes by a factor of two. Then the cost of a box is unknown, and nothing
+    /// is kept.
     fn fit(&mut self, boxes: usize) {
         let before = self.fitted_for;
         if boxes <= 2 * before.max(1) && before <= 2 * boxes.max(1) {
