@@ -168,7 +168,8 @@ impl Policy {
         made
     }
 
-    /// Finds the leader of each candidate. Where the number of objects alone decides, each is its own.
+    /// Finds the leader of each candidate, and of the incumbent. Where the number of objects alone decides, each is its
+    /// own.
     fn lead(&mut self) {
         for k in 0..self.candidates.len() {
             let shares = |&other: &usize| {
@@ -178,6 +179,7 @@ impl Policy {
             let most = (0..self.candidates.len()).filter(shares).max_by_key(|&other| self.candidates[other].width);
             self.candidates[k].leader = most.unwrap_or(k);
         }
+        self.incumbent = self.incumbent.map(|k| self.candidates[k].leader);
     }
 
     pub(super) fn tuning(&self) -> &Tuning {
@@ -311,7 +313,7 @@ impl Policy {
         let candidates = &mut self.candidates;
         self.tangents.evaluate(load, &self.tuning.costs, |k, ns| candidates[k].predicted_ns = ns);
         for k in 0..self.candidates.len() {
-            let (ns, leader) = (self.candidates[k].predicted_ns, self.candidates[k].leader);
+            let Candidate { usable: true, predicted_ns: ns, leader, .. } = self.candidates[k] else { continue };
             self.candidates[leader].predicted_ns = self.candidates[leader].predicted_ns.min(ns);
         }
         self.candidates.iter_mut().for_each(|c| c.own.fade(keep));
@@ -393,11 +395,12 @@ impl Policy {
     }
 
     /// Whether a trial of one candidate beside another tells something new: the same method on half or twice as many
-    /// threads, another method on as many, or another class of processor.
+    /// threads, another method on as many, one that fits its threads, or another class of processor.
     fn is_near(&self, one: usize, other: usize) -> bool {
         let (one, other) = (&self.candidates[one], &self.candidates[other]);
         let (low, high) = (one.width.min(other.width), one.width.max(other.width));
-        one.class != other.class || low == high || one.method == other.method && high <= 2 * low
+        let fits = one.kept.is_some() || other.kept.is_some();
+        one.class != other.class || low == high || fits || one.method == other.method && high <= 2 * low
     }
 
     fn is_hopeless(&self, candidate: usize, incumbent: usize) -> bool {

@@ -126,7 +126,7 @@ impl Runner {
         self.instances.iter().any(|instance| instance.is_incremental)
     }
 
-    /// Gets all of them ready for frames of that many objects.
+    /// Gets those that may be chosen ready for frames of that many objects.
     pub(super) fn prepare(&mut self, objects: usize) {
         self.prepared = self.prepared.max(objects);
         self.take_back(true);

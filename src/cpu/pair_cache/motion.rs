@@ -225,6 +225,7 @@ impl Motion {
         self.displacement = Displacement::default();
         (self.pause, self.next_pause) = (0, 0);
         self.prices.fade(frames);
+        self.prices.searchers.resume();
     }
 
     /// The number of boxes has changed by a factor of two or more: what a box costs is to be learned again. `widths`:

@@ -36,8 +36,8 @@ pub(super) struct Prices {
     /// Number of frames from scratch, and cost of the mean one.
     frames: u32,
     of_scratch: MeanTime,
-    /// Cost of the mean frame with kept pairs, over that.
-    keeping: MeanTime,
+    /// Cost of the mean frame with kept pairs, over that; `None` before the first.
+    keeping: Option<MeanTime>,
     /// On how many threads pairs are kept, and found from scratch.
     pub(super) keepers: Width,
     pub(super) searchers: Width,
@@ -66,7 +66,7 @@ impl Prices {
             timed,
             frames: 0,
             of_scratch: MeanTime::default(),
-            keeping: MeanTime::of(1.0),
+            keeping: None,
             keepers: Width::new(0),
             searchers: Width::new(0),
             lost: 0.0,
@@ -84,23 +84,27 @@ impl Prices {
 
     /// Learns from a frame from scratch, of which the model says `model`.
     pub(super) fn add_scratch(&mut self, took: Option<f32>, model: f32) {
-        let took = took.filter(|_| self.timed);
         self.frames = self.frames.saturating_add(1);
         let counts = self.frames >= FIRST_COUNTED;
-        if counts && took.is_some_and(|took| !self.searchers.ran(took / model)) {
+        let Some(cost) = took.filter(|_| self.timed && counts).map(|took| took / model) else { return };
+        if !self.searchers.ran(cost) {
             return;
         }
-        let took = took.unwrap_or(model);
-        let cost = f64::from(took / model);
-        let before = self.of_scratch.get();
-        if self.frames > FEWEST_FRAMES {
-            self.of_scratch.add(cost);
-        } else if counts {
-            self.of_scratch = MeanTime::of(before.map_or(cost, |least| least.min(cost)));
+        let cost = f64::from(cost);
+        let before = self.of_scratch.get().unwrap_or(cost);
+        if self.frames <= FEWEST_FRAMES {
+            self.of_scratch = MeanTime::of(before.min(cost));
+            return;
         }
-        // A frame with kept pairs takes as long as before: the first frames after a build tell too little.
-        let over = before.zip(self.of_scratch.get()).map_or(1.0, |(before, now)| before / now);
-        self.keeping = MeanTime::of(self.keeping.get().unwrap_or(1.0) * over);
+        self.of_scratch.add(cost);
+        // A frame with kept pairs takes as long as before: the first frames after a build told too little.
+        let over = before / self.of_scratch.get().unwrap_or(cost);
+        self.keeping = self.keeping.and_then(|keeping| keeping.get()).map(|keeping| MeanTime::of(keeping * over));
+    }
+
+    /// Cost of a frame with kept pairs over that from scratch, as far as that is known.
+    fn measured(&self) -> f64 {
+        self.keeping.and_then(|keeping| keeping.get()).unwrap_or(1.0)
     }
 
     /// Returns whether a try of keeping boxes of this pace is worth it by what the model says. The clock ends a try
@@ -109,7 +113,7 @@ impl Prices {
         let failed_at = f64::from(*self.failure.pace.get_or_insert(pace));
         let is_slower = f64::from(pace) < failed_at && !is_same_pace(pace.into(), failed_at);
         let over = if is_slower { self.failure.over.min(WARY) } else { self.failure.over };
-        let measured = self.keeping.get().unwrap_or(1.0) as f32;
+        let measured = self.measured() as f32;
         over * measured * keeping < scratch && (!self.timed || self.frames >= FEWEST_FRAMES)
     }
 
@@ -117,6 +121,7 @@ impl Prices {
     pub(super) fn begin(&mut self, keeping: f32, scratch: f32) {
         // The frame that builds is not counted.
         (self.lost, self.promised, self.kept) = (0.0, [keeping, scratch], [0.0, -1.0]);
+        self.keepers.resume();
     }
 
     /// Frames go by in which no pairs are kept.
@@ -125,7 +130,7 @@ impl Prices {
         let faded = |over: f64| 1.0 + (over - 1.0) * kept;
         self.failure.pace.get_or_insert(f32::INFINITY);
         self.failure.over = faded(self.failure.over.into()) as f32;
-        self.keeping = MeanTime::of(self.keeping.get().map_or(1.0, faded));
+        self.keeping = self.keeping.map(|_| MeanTime::of(faded(self.measured())));
     }
 
     /// Ends a try that did not pay, or that had too many pairs to keep, at any pace.
@@ -135,6 +140,11 @@ impl Prices {
             [sum, frames] if frames > 0.0 => (sum / frames, None),
             _ => (self.promised[0], None),
         };
+        self.searchers.resume();
+        if too_many {
+            // One list may hold more of them if there are fewer.
+            self.keepers = Width::new(0);
+        }
         self.failure = Failure { over: (WARY * work / self.promised[0]).max(WARY), pace };
     }
 
@@ -155,8 +165,8 @@ impl Prices {
         let took = took.unwrap_or(expected);
         let mut most = MOST_OF_FIRST * scratch;
         if !is_first {
-            most = MOST_RISE * expected * self.keeping.get().unwrap_or(1.0) as f32;
-            self.keeping.add(f64::from(took / expected));
+            most = MOST_RISE * expected * self.measured() as f32;
+            self.keeping.get_or_insert(MeanTime::of(1.0)).add(f64::from(took / expected));
         }
         // NaN, of 0 over 0, counts as 0.
         self.lost = (self.lost + took.min(most) / scratch - 1.0).max(0.0);
@@ -191,7 +201,7 @@ mod tests {
         for frame in 0..6 {
             assert!(!begins(&mut prices, 0.1, 10.0, 40.0));
             // The tree is built, and one frame is interrupted.
-            prices.add_scratch(Some(if frame < 2 || frame == 4 { 500.0 } else { 50.0 }), 40.0);
+            prices.add_scratch(Some(if frame < 3 || frame == 4 { 500.0 } else { 50.0 }), 40.0);
         }
         assert!(!begins(&mut prices, 0.1, 41.0, 40.0) && begins(&mut prices, 0.1, 39.0, 40.0));
         // The first frame builds. Then half a frame is saved in each.

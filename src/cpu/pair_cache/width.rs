@@ -10,13 +10,15 @@ const TRIAL: usize = 1 + RECENT;
 const RECENT: usize = 5;
 /// Share of the time that trials may cost.
 const BUDGET: f64 = 0.005;
-/// Frames before the first trial, and between two of them, at least and at most.
+/// Frames before the first trial, and between two of them, at least.
 const FIRST: u32 = 8;
-const APART: [f64; 2] = [64.0, 1024.0];
+const APART: u32 = 64;
 /// What is tried stays if it takes less than this share of the time.
 const WINS: f64 = 0.97;
-/// A frame of a trial counts as at most this many usual ones: a longer one was interrupted.
-const MOST: f64 = 8.0;
+/// A trial ends once its later frames have cost this many usual ones too much. A frame counts as at most so many: a
+/// breakpoint says nothing of later frames.
+const MOST_LOST: f64 = 4.0;
+const MOST: f64 = 64.0;
 
 /// The number of threads, as a position in the ascending list of those that can be had.
 #[derive(Debug, Clone)]
@@ -58,6 +60,11 @@ impl Width {
         self.trial.as_ref().map_or(self.now, |trial| trial.at)
     }
 
+    /// Goes on after frames of another kind: what is compared follows each other.
+    pub(super) fn resume(&mut self) {
+        (self.trial, self.pause) = (None, self.pause.max(FIRST));
+    }
+
     /// Takes in the cost of a frame over what the cost model says of it. Returns whether it was a usual one.
     pub(super) fn ran(&mut self, cost: f32) -> bool {
         let Some(trial) = &mut self.trial else {
@@ -68,15 +75,13 @@ impl Width {
         };
         trial.costs[trial.frames] = cost.into();
         trial.frames += 1;
-        if trial.frames == TRIAL {
-            let [usual, tried] = [&self.costs, &trial.costs[1..]].map(middle);
-            if tried < WINS * usual {
-                self.wider = trial.at > self.now;
-                (self.now, self.pause) = (trial.at, FIRST);
-            } else {
-                let lost = trial.costs.map(|cost| (cost / usual - 1.0).clamp(0.0, MOST));
-                self.pause = (lost.iter().sum::<f64>() / BUDGET).clamp(APART[0], APART[1]) as u32;
-            }
+        let usual = middle(&self.costs);
+        let lost = trial.costs.map(|cost| (cost / usual - 1.0).clamp(0.0, MOST));
+        let later: f64 = lost[1..].iter().sum();
+        if trial.frames == TRIAL && middle(&trial.costs[1..]) < WINS * usual {
+            *self = Self { wider: trial.at > self.now, ..Self::new(trial.at) };
+        } else if trial.frames == TRIAL || later > MOST_LOST {
+            self.pause = APART.max(((lost[0] + later) / BUDGET) as u32);
             self.trial = None;
         }
         false
@@ -130,6 +135,21 @@ mod tests {
             width.ran([1.0, 1.4][at] * if frame % 3 == 0 { 4.0 } else { 1.0 });
             assert_eq!(width.now, 0, "frame {frame}");
         }
+    }
+
+    #[test]
+    fn trials_cost_no_more_than_their_budget() {
+        let mut width = Width::new(0);
+        let mut lost = 0.0;
+        for frame in 0..100_000 {
+            let at = width.next(1);
+            // The helper waits for another program's turn.
+            let cost = [1.0, 12.0][at];
+            lost += cost - 1.0;
+            assert!(width.now == 0 && lost < 30.0 + 0.006 * frame as f32, "frame {frame}: {lost}");
+            width.ran(cost);
+        }
+        assert!(lost > 100.0, "{lost}");
     }
 
     #[test]
