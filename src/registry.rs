@@ -85,8 +85,8 @@ impl Registry {
         registry
     }
 
-    /// Adds a user's algorithm, or replaces the one with the same id. If it is incremental and named `pair-cache`, it is
-    /// taken to fit its threads to a frame as that does.
+    /// Adds a user's algorithm, or replaces the one with the same id. An incremental one that is named `pair-cache` is
+    /// taken to fit its threads to a frame, as the built-in one does.
     pub fn add(
         &mut self,
         id: AlgorithmId,

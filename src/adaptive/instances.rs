@@ -143,8 +143,8 @@ pub struct Instances {
 }
 
 impl Instances {
-    /// Of each candidate the number of what it keeps from frame to frame; `None` where it keeps nothing. The same on
-    /// any number of threads, if the method itself fits them to a frame: only one of these runs.
+    /// Numbers the states that candidates keep from frame to frame; `None` for one that keeps nothing. If a method fits
+    /// its threads to a frame, its candidates have one number together, and only one of them runs.
     pub(super) fn kept(&self) -> Vec<Option<usize>> {
         let fits = |c: &Candidate| built_in(&c.id).is_some_and(|method| method.fits_threads);
         let first = |id: &AlgorithmId| self.candidates.iter().position(|c| c.id.method() == id.method() && fits(c));

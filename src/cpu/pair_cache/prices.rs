@@ -36,8 +36,8 @@ pub(super) struct Prices {
     /// Number of frames from scratch, and cost of the mean one.
     frames: u32,
     of_scratch: MeanTime,
-    /// Cost of the mean frame with kept pairs, over that; `None` before the first.
-    keeping: Option<MeanTime>,
+    /// Cost of the mean frame with kept pairs, over that.
+    keeping: MeanTime,
     /// On how many threads pairs are kept, and found from scratch.
     pub(super) keepers: Width,
     pub(super) searchers: Width,
@@ -66,7 +66,7 @@ impl Prices {
             timed,
             frames: 0,
             of_scratch: MeanTime::default(),
-            keeping: None,
+            keeping: MeanTime::default(),
             keepers: Width::new(0),
             searchers: Width::new(0),
             lost: 0.0,
@@ -99,12 +99,16 @@ impl Prices {
         self.of_scratch.add(cost);
         // A frame with kept pairs takes as long as before: the first frames after a build told too little.
         let over = before / self.of_scratch.get().unwrap_or(cost);
-        self.keeping = self.keeping.and_then(|keeping| keeping.get()).map(|keeping| MeanTime::of(keeping * over));
+        self.change_keeping(|keeping| keeping * over);
+    }
+
+    fn change_keeping(&mut self, change: impl Fn(f64) -> f64) {
+        self.keeping = self.keeping.get().map(change).map_or_else(MeanTime::default, MeanTime::of);
     }
 
     /// Cost of a frame with kept pairs over that from scratch, as far as that is known.
     fn measured(&self) -> f64 {
-        self.keeping.and_then(|keeping| keeping.get()).unwrap_or(1.0)
+        self.keeping.get().unwrap_or(1.0)
     }
 
     /// Returns whether a try of keeping boxes of this pace is worth it by what the model says. The clock ends a try
@@ -130,7 +134,7 @@ impl Prices {
         let faded = |over: f64| 1.0 + (over - 1.0) * kept;
         self.failure.pace.get_or_insert(f32::INFINITY);
         self.failure.over = faded(self.failure.over.into()) as f32;
-        self.keeping = self.keeping.map(|_| MeanTime::of(faded(self.measured())));
+        self.change_keeping(faded);
     }
 
     /// Ends a try that did not pay, or that had too many pairs to keep, at any pace.
@@ -166,7 +170,8 @@ impl Prices {
         let mut most = MOST_OF_FIRST * scratch;
         if !is_first {
             most = MOST_RISE * expected * self.measured() as f32;
-            self.keeping.get_or_insert(MeanTime::of(1.0)).add(f64::from(took / expected));
+            self.keeping = MeanTime::of(self.measured());
+            self.keeping.add(f64::from(took / expected));
         }
         // NaN, of 0 over 0, counts as 0.
         self.lost = (self.lost + took.min(most) / scratch - 1.0).max(0.0);

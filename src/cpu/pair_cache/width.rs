@@ -15,8 +15,8 @@ const FIRST: u32 = 8;
 const APART: u32 = 64;
 /// What is tried stays if it takes less than this share of the time.
 const WINS: f64 = 0.97;
-/// A trial ends once its later frames have cost this many usual ones too much. A frame counts as at most so many: a
-/// breakpoint says nothing of later frames.
+/// A trial ends early once the frames after its first have lost the time of this many usual frames. One frame loses at
+/// most the second number: a breakpoint says nothing of later frames.
 const MOST_LOST: f64 = 4.0;
 const MOST: f64 = 64.0;
 
@@ -60,7 +60,7 @@ impl Width {
         self.trial.as_ref().map_or(self.now, |trial| trial.at)
     }
 
-    /// Goes on after frames of another kind: what is compared follows each other.
+    /// Goes on after frames of another kind: a trial is compared with the frames just before it.
     pub(super) fn resume(&mut self) {
         (self.trial, self.pause) = (None, self.pause.max(FIRST));
     }
