@@ -95,7 +95,7 @@ impl Adaptive {
     /// `wasm32-unknown-unknown`, which has no clock, no frame is timed and nothing is learned, unless the program gives
     /// a clock by `sapwise::set_clock`. Frames of less than four ticks of that clock are not learned from.
     pub fn set_learning(&mut self, learns: bool) {
-        self.runner.policy.set_learning(learns && clock::ticks());
+        self.runner.policy.learns = learns && clock::ticks();
     }
 
     /// Whether trials run: now and then another algorithm than the cheapest runs for 2 to 16 frames, to learn what it
@@ -104,13 +104,13 @@ impl Adaptive {
     /// On unless turned off; without [learning](Self::set_learning) none runs. On how many threads `pair-cache` is fast
     /// it tries by itself, for another 0.5 %.
     pub fn set_exploring(&mut self, explores: bool) {
-        self.runner.policy.set_exploring(explores);
+        self.runner.policy.explores = explores;
     }
 
     /// The tuning that it began with.
     #[must_use]
     pub fn tuning(&self) -> &Tuning {
-        self.runner.policy.tuning()
+        &self.runner.policy.tuning
     }
 
     /// The tuning corrected by what was learned of the machine and of each algorithm, with the slice of scenes like
@@ -118,12 +118,12 @@ impl Adaptive {
     /// scene spares incremental algorithms. Those that it began with where nothing was learned.
     #[must_use]
     pub fn learned(&self) -> Tuning {
-        let tuning = self.runner.policy.tuning();
+        let tuning = &self.runner.policy.tuning;
         if !self.runner.policy.has_learned() {
             return tuning.clone();
         }
         let costs = self.runner.policy.learned_costs();
-        let load = self.runner.tracker.load();
+        let load = self.runner.tracker.load;
         let like = |quarter: u32| {
             let objects = 10.0_f64.powf(f64::from(quarter) / 4.0).round() as u32;
             load.rescaled(objects, load.pairs * f64::from(objects) / f64::from(load.objects.max(1)))
@@ -146,7 +146,7 @@ impl Adaptive {
     /// # Errors
     /// As [`new`](Self::new); the algorithms of before stay then.
     pub fn revive(&mut self, registry: &Registry) -> Result<(), Error> {
-        let mut made = Instances::of(self.runner.policy.tuning(), registry);
+        let mut made = Instances::of(&self.runner.policy.tuning, registry);
         if let Some(error) = made.failure() {
             return Err(error);
         }
@@ -157,7 +157,7 @@ impl Adaptive {
     /// Takes the tuning from the background thread once it is there.
     pub(crate) fn take_over(&mut self) {
         let arrived = self.start.arrived();
-        self.runner.set_awaits(self.start.background.is_some());
+        self.runner.awaits = self.start.background.is_some();
         if let Some((tuning, made)) = arrived {
             self.runner.replace(tuning, made);
         }
@@ -182,7 +182,7 @@ impl Adaptive {
     /// Begins with what a start on this machine found.
     #[doc(hidden)]
     pub fn set_start(&mut self, start: Start) {
-        self.runner.set_awaits(start.background.is_some());
+        self.runner.awaits = start.background.is_some();
         self.start = start;
     }
 
@@ -232,7 +232,7 @@ impl BroadPhase for Adaptive {
 
     /// Of an algorithm that keeps nothing every frame is from scratch.
     fn last_frame(&self) -> FrameWork {
-        self.runner.work().unwrap_or(FrameWork::new(FrameKind::FromScratch, 1.0))
+        self.runner.work.unwrap_or(FrameWork::new(FrameKind::FromScratch, 1.0))
     }
 }
 

@@ -1,42 +1,32 @@
 //! What was decided for a frame, and why.
 
 use crate::algorithm::AlgorithmId;
+use crate::described::described;
 use crate::load::Load;
 use crate::tuning::Source;
 use std::fmt;
 
-/// Why an algorithm was chosen.
-///
-/// ```
-/// assert_eq!(sapwise::Reason::Stayed.to_string(), "still the cheapest");
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Reason {
-    /// The first frame: nothing ran before.
-    First,
-    /// It ran before and is still the cheapest.
-    Stayed,
-    /// Another would be cheaper, but has not yet promised to save what the switch to it costs.
-    Hysteresis,
-    /// It became cheaper than the one before, by more than the switch costs.
-    Switched,
-    /// It is not the cheapest: it runs in this frame to find out what it costs.
-    Explored,
-    /// The one that was chosen failed in this frame.
-    FellBack,
-}
-
-impl fmt::Display for Reason {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::First => "the cheapest in the first frame",
-            Self::Stayed => "still the cheapest",
-            Self::Hysteresis => "no longer the cheapest, but a switch would not have paid yet",
-            Self::Switched => "cheaper than the one before by more than the switch costs",
-            Self::Explored => "not the cheapest, tried to learn what it costs",
-            Self::FellBack => "in place of one that failed",
-        })
+described! {
+    /// Why an algorithm was chosen.
+    ///
+    /// ```
+    /// assert_eq!(sapwise::Reason::Stayed.to_string(), "still the cheapest");
+    /// ```
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    #[non_exhaustive]
+    pub enum Reason {
+        /// The first frame: nothing ran before.
+        First = "the cheapest in the first frame",
+        /// It ran before and is still the cheapest.
+        Stayed = "still the cheapest",
+        /// Another would be cheaper, but has not yet promised to save what the switch to it costs.
+        Hysteresis = "no longer the cheapest, but a switch would not have paid yet",
+        /// It became cheaper than the one before, by more than the switch costs.
+        Switched = "cheaper than the one before by more than the switch costs",
+        /// It is not the cheapest: it runs in this frame to find out what it costs.
+        Explored = "not the cheapest, tried to learn what it costs",
+        /// The one that was chosen failed in this frame.
+        FellBack = "in place of one that failed",
     }
 }
 

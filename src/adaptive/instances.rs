@@ -10,32 +10,28 @@ use crate::pairs::Pairs;
 use crate::registry::{Registry, built_in};
 use crate::tuning::Tuning;
 
-/// An algorithm of the tuning.
-pub(crate) struct Candidate {
-    pub(super) id: AlgorithmId,
-    /// Its position among the instances; `None` once it failed, or where it can't run.
-    pub(super) instance: Option<usize>,
-}
-
-/// Runs one candidate.
+/// What runs an algorithm of the tuning.
 pub(crate) struct Instance {
-    place: Place,
+    pub(super) place: Place,
+    pub(super) id: AlgorithmId,
     /// Whether it may wait for a driver while it gets ready.
     waits: bool,
     /// Whether it builds on the frame before.
     pub(super) is_incremental: bool,
     /// Objects that its buffers are ready for.
-    ready: usize,
+    pub(super) ready: usize,
     /// The first frame since its last one that another one ran and of which it was not told; `None` while it goes on,
     /// and before its first.
-    left_at: Option<u64>,
+    pub(super) left_at: Option<u64>,
 }
 
 impl Instance {
-    fn new(id: &AlgorithmId, algorithm: Box<dyn BroadPhase>) -> Self {
-        let is_incremental = algorithm.is_incremental();
+    /// Without `algorithm` it can't run.
+    fn new(id: &AlgorithmId, algorithm: Option<Box<dyn BroadPhase>>) -> Self {
+        let is_incremental = algorithm.as_ref().is_some_and(|algorithm| algorithm.is_incremental());
         let waits = matches!(id.backend(), Backend::Gpu(_));
-        Self { place: Place::Here(algorithm), waits, is_incremental, ready: 0, left_at: None }
+        let place = algorithm.map_or(Place::Gone, Place::Here);
+        Self { place, id: id.clone(), waits, is_incremental, ready: 0, left_at: None }
     }
 
     /// Gets it ready for frames of that many objects, now.
@@ -50,7 +46,7 @@ impl Instance {
     /// The same within a frame: what may wait for a driver does so on a thread of its own.
     pub(super) fn warm(&mut self, objects: usize) {
         // What is away for fewer is cold once more when it comes back.
-        if self.is_away() {
+        if self.place.is_away() {
             return;
         }
         if self.waits {
@@ -61,47 +57,27 @@ impl Instance {
         }
     }
 
-    /// Whether that is still to be done for so many objects.
-    pub(super) fn is_cold(&self, objects: usize) -> bool {
-        self.ready < objects
-    }
-
     /// Takes it back from that thread if it is ready, or else with `patience` when it is. Whether it has come back.
     pub(super) fn take_back(&mut self, patience: bool) -> bool {
-        let away = self.is_away();
+        let away = self.place.is_away();
         if patience {
             self.place.wait();
         } else {
             self.place.take_back();
         }
-        away && !self.is_away()
-    }
-
-    pub(super) fn is_away(&self) -> bool {
-        self.place.is_away()
-    }
-
-    /// Whether it can run: it is neither away nor did it panic there.
-    pub(super) fn is_here(&mut self) -> bool {
-        self.place.here().is_some()
-    }
-
-    /// Another one ran this frame, and it the one before.
-    pub(super) fn leave(&mut self, frame: u64) {
-        self.left_at = Some(frame);
+        away && !self.place.is_away()
     }
 
     /// Finds the pairs of this frame. Returns how the frame came about where one may build on the one before.
     pub(super) fn run(
         &mut self,
-        id: &AlgorithmId,
         frame: u64,
         plan: &FramePlan,
         boxes: &[Aabb],
         pairs: &mut Pairs,
     ) -> Result<Option<FrameWork>, Error> {
         let Some(algorithm) = self.place.here() else {
-            return Err(Error::Unavailable { algorithm: id.clone(), reason: Unavailable::FailedBefore });
+            return Err(Error::Unavailable { algorithm: self.id.clone(), reason: Unavailable::FailedBefore });
         };
         if let Some(left_at) = self.left_at.filter(|&left_at| self.is_incremental && left_at < frame) {
             algorithm.missed_frames(frame - left_at);
@@ -137,7 +113,6 @@ pub struct Instances {
     /// What made them.
     pub(super) registry: Registry,
     /// In the order of [`Tuning::algorithms`].
-    pub(super) candidates: Vec<Candidate>,
     pub(super) instances: Vec<Instance>,
     pub(super) failure: Option<Error>,
 }
@@ -146,45 +121,37 @@ impl Instances {
     /// Numbers the states that candidates keep from frame to frame; `None` for one that keeps nothing. If a method fits
     /// its threads to a frame, its candidates have one number together, and only one of them runs.
     pub(super) fn kept(&self) -> Vec<Option<usize>> {
-        let fits = |c: &Candidate| built_in(&c.id).is_some_and(|method| method.fits_threads);
-        let first = |id: &AlgorithmId| self.candidates.iter().position(|c| c.id.method() == id.method() && fits(c));
-        let kept = |(k, c): (usize, &Candidate)| {
-            c.instance.filter(|&i| self.instances[i].is_incremental)?;
-            Some(if fits(c) { first(&c.id)? } else { k })
+        let fits = |one: &Instance| built_in(&one.id).is_some_and(|method| method.fits_threads);
+        let first =
+            |id: &AlgorithmId| self.instances.iter().position(|one| one.id.method() == id.method() && fits(one));
+        let kept = |(k, one): (usize, &Instance)| match one.is_incremental {
+            true if fits(one) => first(&one.id),
+            incremental => incremental.then_some(k),
         };
-        self.candidates.iter().enumerate().map(kept).collect()
+        self.instances.iter().enumerate().map(kept).collect()
     }
 
-    /// Which candidates can run.
+    /// Which can run.
     pub(super) fn usable(&self) -> Vec<bool> {
-        self.candidates.iter().map(|c| c.instance.is_some()).collect()
+        self.instances.iter().map(|one| one.place.is_here()).collect()
     }
 
     /// Why none of the algorithms can run; `None` where one can.
     pub fn failure(&mut self) -> Option<Error> {
-        if self.instances.is_empty() { Some(self.failure.take().unwrap_or(Error::NoAlgorithm)) } else { None }
+        let none = !self.usable().contains(&true);
+        none.then(|| self.failure.take().unwrap_or(Error::NoAlgorithm))
     }
 
     /// Makes the algorithms of a tuning.
     pub fn of(tuning: &Tuning, registry: &Registry) -> Self {
-        let ids = tuning.algorithms();
-        let mut made = Self {
-            registry: registry.clone(),
-            candidates: ids.iter().map(|&id| Candidate { id: id.clone(), instance: None }).collect(),
-            instances: Vec::new(),
-            failure: None,
-        };
-        for (candidate, id) in made.candidates.iter_mut().zip(ids) {
+        let mut failure = None;
+        let instance = |id: &AlgorithmId| {
             let cost = tuning.costs.iter().find(|c| c.algorithm == *id);
             let stale = cost.and_then(|c| registry.mismatch(id, c.revision));
-            match stale.map_or_else(|| registry.create(id), Err) {
-                Ok(algorithm) => {
-                    candidate.instance = Some(made.instances.len());
-                    made.instances.push(Instance::new(id, algorithm));
-                }
-                Err(why) => made.failure = Some(why),
-            }
-        }
-        made
+            let made = stale.map_or_else(|| registry.create(id), Err);
+            Instance::new(id, made.map_err(|why| failure = Some(why)).ok())
+        };
+        let instances = tuning.algorithms().into_iter().map(instance).collect();
+        Self { registry: registry.clone(), instances, failure }
     }
 }

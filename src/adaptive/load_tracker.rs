@@ -38,16 +38,17 @@ enum Watch {
 pub(super) struct LoadTracker {
     pub(super) pace: Pace,
     watch: Watch,
-    load: Load,
+    /// The last estimate.
+    pub(super) load: Load,
     /// What the last sample tells the algorithm about the frame that follows.
-    plan: FramePlan,
+    pub(super) plan: FramePlan,
     /// Objects at the last sample, frames and nanoseconds since; nanoseconds of a sample.
     sampled: Option<u32>,
-    age: u32,
+    pub(super) age: u32,
     since_sample_ns: f64,
     sample_ns: f64,
     /// The last motion that was found, nanoseconds since, and nanoseconds of a look.
-    motion: Option<Motion>,
+    pub(super) motion: Option<Motion>,
     since_look_ns: f64,
     look_ns: f64,
     displacement: Displacement,
@@ -56,20 +57,6 @@ pub(super) struct LoadTracker {
 }
 
 impl LoadTracker {
-    /// How far boxes move in a frame, in mean edges, if known.
-    pub(super) fn moved(&self) -> Option<f64> {
-        self.motion.map(|motion| motion.moved)
-    }
-
-    /// The load that was estimated last.
-    pub(super) fn load(&self) -> Load {
-        self.load
-    }
-
-    pub(super) fn plan(&self) -> &FramePlan {
-        &self.plan
-    }
-
     /// Sets the load to that of a first frame, of which only the number of boxes is known.
     pub(super) fn begin(&mut self, boxes: &[Aabb]) {
         self.load = Load::of_objects(count(boxes)).with_motion(Motion::MOST);
@@ -96,7 +83,7 @@ impl LoadTracker {
             self.load = self.load.rescaled(objects, pairs.unwrap_or(self.load.pairs));
             self.load = self.motion.map_or(self.load, |motion| self.load.with_motion(motion));
         }
-        self.plan = plan.with_moved(self.moved()).with_pairs(pairs);
+        self.plan = plan.with_moved(self.motion.map(|motion| motion.moved)).with_pairs(pairs);
         spent_ns
     }
 
@@ -170,12 +157,6 @@ impl LoadTracker {
         (self.knows_pairs, self.motion, self.watch) = (false, None, Watch::Resting);
         self.sampled = None;
         self.pace.wake();
-    }
-
-    /// Frames since the last sample.
-    #[cfg(test)]
-    pub(super) fn age(&self) -> u32 {
-        self.age
     }
 }
 

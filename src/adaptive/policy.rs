@@ -94,15 +94,15 @@ struct Kept {
 /// Chooses, and learns from the times of frames.
 #[derive(Debug, Clone)]
 pub(super) struct Policy {
-    tuning: Tuning,
+    pub(super) tuning: Tuning,
     candidates: Vec<Candidate>,
     tangents: Tangents,
     classes: Vec<Part>,
     kept: Vec<Kept>,
     /// The first number of objects and the candidate of each step whose algorithm is a candidate, ascending.
     steps: Vec<(u32, usize)>,
-    learns: bool,
-    explores: bool,
+    pub(super) learns: bool,
+    pub(super) explores: bool,
     /// Observed epochs, and surprises in a row, counted with their sign.
     observed: u64,
     surprises: i32,
@@ -113,13 +113,14 @@ pub(super) struct Policy {
     ran: Option<usize>,
     trials: Trials,
     /// Number of the next frame, and of the one of the last decision.
-    frame: u64,
+    pub(super) frame: u64,
     decided: u64,
     /// Objects at the last decision.
     objects: u32,
     /// Most frames until the next decision while a switch is pending.
     rest: Option<f64>,
-    decision_ns: f64,
+    /// What a decision takes.
+    pub(super) decision_ns: f64,
 }
 
 impl Policy {
@@ -182,23 +183,6 @@ impl Policy {
         self.incumbent = self.incumbent.map(|k| self.candidates[k].leader);
     }
 
-    pub(super) fn tuning(&self) -> &Tuning {
-        &self.tuning
-    }
-
-    pub(super) fn set_learning(&mut self, learns: bool) {
-        self.learns = learns;
-    }
-
-    pub(super) fn set_exploring(&mut self, explores: bool) {
-        self.explores = explores;
-    }
-
-    /// Learns and explores if that one does.
-    pub(super) fn set_as(&mut self, other: &Self) {
-        (self.learns, self.explores) = (other.learns, other.explores);
-    }
-
     /// Whether frames have shown anything.
     pub(super) fn has_learned(&self) -> bool {
         self.observed > 0
@@ -228,11 +212,6 @@ impl Policy {
         self.tuning.costs.is_empty()
     }
 
-    /// The number of the next frame.
-    pub(super) fn frame(&self) -> u64 {
-        self.frame
-    }
-
     pub(super) fn set_usable(&mut self, candidate: usize, usable: bool) {
         let c = &mut self.candidates[candidate];
         (c.usable, c.saved_ns) = (usable, 0.0);
@@ -250,10 +229,10 @@ impl Policy {
 
     /// Other instances take the place of the previous ones.
     pub(super) fn remade(&mut self, kept: &[Option<usize>], usable: &[bool]) {
-        for k in 0..usable.len() {
-            self.set_usable(k, usable[k]);
-            self.candidates[k].kept = kept[k];
+        for (c, (&kept, &usable)) in self.candidates.iter_mut().zip(kept.iter().zip(usable)) {
+            (c.kept, c.usable, c.saved_ns) = (kept, usable, 0.0);
         }
+        self.incumbent = self.incumbent.filter(|&k| usable[k]);
         self.kept = states(kept);
         self.lead();
         (self.ran, self.trials.running) = (None, None);
@@ -530,11 +509,6 @@ impl Policy {
             return Some(self.choice(trial.candidate, Reason::Switched));
         }
         Some(self.choice(incumbent, Reason::Stayed))
-    }
-
-    /// Takes in what decisions take, in nanoseconds.
-    pub(super) fn decisions_take(&mut self, ns: f64) {
-        self.decision_ns = ns;
     }
 
     /// The step that holds at this number of objects, or the nearest below or above that can run.

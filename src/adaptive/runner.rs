@@ -2,9 +2,10 @@
 
 use super::decision::{Choice, Decision, Reason};
 use super::epoch::Epoch;
-use super::instances::{Candidate, Instance, Instances};
+use super::instances::{Instance, Instances};
 use super::load_tracker::{LoadTracker, count};
 use super::policy::Policy;
+use super::warming::Place;
 use crate::aabb::Aabb;
 use crate::broad_phase::FrameWork;
 use crate::clock::{self, Instant};
@@ -27,19 +28,18 @@ const FIRST_SAMPLED: usize = 1000;
 pub(super) struct Runner {
     /// The next frame goes on unless the tracker calls for a decision.
     steady: bool,
-    /// Another tuning may arrive before any frame.
-    awaits: bool,
-    /// The instance whose frame succeeded last; `None` before the first one of these instances.
+    /// Another tuning may [take the place](Self::replace) of this one before any frame.
+    pub(super) awaits: bool,
+    /// What ran last and did not fail; `None` before the first frame of these instances.
     running: Option<usize>,
+    /// In the order of [`Tuning::algorithms`].
     instances: Vec<Instance>,
     /// Nanoseconds of the last frame if it was timed, and its work if it is incremental.
     measured_ns: Option<f64>,
-    work: Option<FrameWork>,
+    pub(super) work: Option<FrameWork>,
     epoch: Epoch,
     pub(super) tracker: LoadTracker,
-    /// In the order of [`Tuning::algorithms`].
-    candidates: Vec<Candidate>,
-    /// What made them.
+    /// What made the instances.
     registry: Registry,
     pub(super) policy: Policy,
     choice: Option<Choice>,
@@ -58,7 +58,7 @@ impl Runner {
 
     /// Makes the same algorithms anew. The first frame estimates the load; what was learned stays.
     pub(super) fn twin(&self) -> Self {
-        let (mut policy, made) = (self.policy.clone(), Instances::of(self.policy.tuning(), &self.registry));
+        let (mut policy, made) = (self.policy.clone(), Instances::of(&self.policy.tuning, &self.registry));
         policy.remade(&made.kept(), &made.usable());
         Self::with(policy, made)
     }
@@ -75,17 +75,11 @@ impl Runner {
             work: None,
             epoch: Epoch::default(),
             tracker: LoadTracker::default(),
-            candidates: made.candidates,
             choice: None,
             any_away: false,
             prepared: 0,
             decided: None,
         }
-    }
-
-    /// Sets whether another tuning may [take the place](Self::replace) of this one before any frame.
-    pub(super) fn set_awaits(&mut self, awaits: bool) {
-        self.awaits = awaits;
     }
 
     /// Whether another tuning may come before the next frame.
@@ -95,8 +89,9 @@ impl Runner {
 
     /// Goes on with another tuning and its algorithms. The estimate of the load stays.
     pub(super) fn replace(&mut self, tuning: Tuning, made: Instances) {
-        let before = std::mem::replace(&mut self.policy, policy(tuning, &made));
-        self.policy.set_as(&before);
+        let Policy { learns, explores, .. } = self.policy;
+        self.policy = policy(tuning, &made);
+        (self.policy.learns, self.policy.explores) = (learns, explores);
         self.exchange(made);
         // Within a frame, so that what may block gets ready on a thread of its own.
         self.choices().into_iter().for_each(|k| self.warm(k, self.prepared));
@@ -111,14 +106,8 @@ impl Runner {
     }
 
     fn exchange(&mut self, made: Instances) {
-        (self.candidates, self.instances, self.running) = (made.candidates, made.instances, None);
-        self.registry = made.registry;
+        (self.instances, self.registry, self.running) = (made.instances, made.registry, None);
         (self.decided, self.choice, self.steady, self.epoch) = (None, None, false, Epoch::default());
-    }
-
-    /// The work of the last frame if its algorithm is incremental.
-    pub(super) fn work(&self) -> Option<FrameWork> {
-        self.work
     }
 
     /// Whether any of the algorithms is incremental.
@@ -133,22 +122,21 @@ impl Runner {
         self.choices().into_iter().for_each(|k| self.instances[k].prepare(objects));
     }
 
-    /// The instances that may be chosen.
+    /// Those that may be chosen.
     fn choices(&self) -> Vec<usize> {
-        let choice = |(k, c): (usize, &Candidate)| c.instance.filter(|_| self.policy.is_choice(k));
-        self.candidates.iter().enumerate().filter_map(choice).collect()
+        (0..self.instances.len()).filter(|&k| self.policy.is_choice(k)).collect()
     }
 
     /// What was decided for the last frame; `None` before the first.
     pub(super) fn last_decision(&self) -> Option<Decision<'_>> {
         self.choice.map(|c| Decision {
-            algorithm: &self.candidates[c.chosen].id,
+            algorithm: &self.instances[c.chosen].id,
             predicted_ns: c.predicted_ns,
             measured_ns: self.measured_ns,
-            runner_up: c.runner_up.map(|(k, ns)| (&self.candidates[k].id, ns)),
+            runner_up: c.runner_up.map(|(k, ns)| (&self.instances[k].id, ns)),
             reason: c.reason,
-            source: if self.policy.has_learned() { Source::Learned } else { self.policy.tuning().source },
-            load: self.tracker.load(),
+            source: if self.policy.has_learned() { Source::Learned } else { self.policy.tuning.source },
+            load: self.tracker.load,
         })
     }
 
@@ -213,12 +201,12 @@ impl Runner {
         self.measured_ns = None;
         let took_ns = (clock::elapsed_ns(started) - spent_ns).max(0.0);
         self.tracker.pace.decided(count(boxes), took_ns);
-        self.policy.decisions_take(self.tracker.pace.decision_ns);
+        self.policy.decision_ns = self.tracker.pace.decision_ns;
     }
 
     /// Chooses among those that are here; if none is, among those that are awaited.
     fn choose_among(&mut self, choose: impl Fn(&mut Policy, &crate::load::Load) -> Option<Choice>) -> Option<Choice> {
-        let load = self.tracker.load();
+        let load = self.tracker.load;
         let choice = choose(&mut self.policy, &load);
         if choice.is_some() || !self.take_back(true) {
             return choice;
@@ -226,10 +214,10 @@ impl Runner {
         choose(&mut self.policy, &load)
     }
 
-    /// Gets an instance ready. If that takes a thread of its own, its candidates are not chosen meanwhile.
+    /// Gets an instance ready. If that takes a thread of its own, it is not chosen meanwhile.
     fn warm(&mut self, instance: usize, objects: usize) {
         self.instances[instance].warm(objects);
-        self.any_away |= self.instances[instance].is_away();
+        self.any_away |= self.instances[instance].place.is_away();
         self.update(instance);
     }
 
@@ -245,20 +233,14 @@ impl Runner {
                 self.update(k);
                 any = true;
             }
-            self.any_away |= self.instances[k].is_away();
+            self.any_away |= self.instances[k].place.is_away();
         }
         any
     }
 
-    /// Its candidates can be chosen while it is here, and never again once it is gone.
+    /// An instance can be chosen while it is here.
     fn update(&mut self, instance: usize) {
-        let (here, away) = (self.instances[instance].is_here(), self.instances[instance].is_away());
-        for (k, candidate) in self.candidates.iter_mut().enumerate().filter(|(_, c)| c.instance == Some(instance)) {
-            self.policy.set_usable(k, here);
-            if !here && !away {
-                candidate.instance = None;
-            }
-        }
+        self.policy.set_usable(instance, self.instances[instance].place.is_here());
     }
 
     /// Runs a frame that needs no decision.
@@ -300,19 +282,18 @@ impl Runner {
             let Some(choice) = self.choice else {
                 // What the last one left is no answer.
                 pairs.clear();
-                let algorithm = self.candidates[0].id.clone();
+                let algorithm = self.instances[0].id.clone();
                 return Err(Error::Unavailable { algorithm, reason: Unavailable::AllFailed });
             };
-            let candidate = &self.candidates[choice.chosen];
-            let Some(instance) = candidate.instance else { return Err(self.gone()) };
-            let frame = self.policy.frame() + u64::from(self.epoch.frames);
+            let chosen = choice.chosen;
+            let frame = self.policy.frame + u64::from(self.epoch.frames);
             let started = Instant::now();
-            match self.instances[instance].run(&candidate.id, frame, self.tracker.plan(), boxes, pairs) {
+            match self.instances[chosen].run(frame, &self.tracker.plan, boxes, pairs) {
                 Ok(work) => {
                     let ns = clock::measured_ns(started);
                     (self.work, self.measured_ns) = (work, ns);
-                    if let Some(before) = self.running.replace(instance).filter(|before| *before != instance) {
-                        self.instances[before].leave(frame);
+                    if let Some(before) = self.running.replace(chosen).filter(|before| *before != chosen) {
+                        self.instances[before].left_at = Some(frame);
                     }
                     self.ran(choice, ns, boxes, pairs);
                     return Ok(());
@@ -358,7 +339,7 @@ impl Runner {
     /// What to say if the algorithm that runs is gone.
     #[cold]
     fn gone(&self) -> Error {
-        let algorithm = self.candidates[self.choice.map_or(0, |choice| choice.chosen)].id.clone();
+        let algorithm = self.instances[self.choice.map_or(0, |choice| choice.chosen)].id.clone();
         Error::Unavailable { algorithm, reason: Unavailable::FailedBefore }
     }
 
@@ -371,8 +352,8 @@ impl Runner {
             self.policy.failed();
             return Err(error);
         };
-        self.candidates[choice.chosen].instance = None;
-        self.policy.set_usable(choice.chosen, false);
+        self.instances[choice.chosen].place = Place::Gone;
+        self.update(choice.chosen);
         self.catch_up();
         let next = self.choose_among(|policy, load| policy.choose(load));
         self.choice = next.map(|c| Choice { reason: Reason::FellBack, ..c });
@@ -385,16 +366,16 @@ impl Runner {
             return;
         };
         // The runner-up of a trial is the incumbent, which must be here when that ends.
-        let Some(instance) = self.candidates[next].instance.filter(|_| reason != Reason::Explored) else { return };
-        if ns <= best * WARM_WITHIN && self.instances[instance].is_cold(boxes) {
+        let tried = reason == Reason::Explored;
+        if !tried && ns <= best * WARM_WITHIN && self.instances[next].ready < boxes {
             // By powers of two, so that a growing scene pays for this a few times in all.
-            self.warm(instance, boxes.checked_next_power_of_two().unwrap_or(boxes));
+            self.warm(next, boxes.checked_next_power_of_two().unwrap_or(boxes));
         }
     }
 }
 
 fn policy(tuning: Tuning, made: &Instances) -> Policy {
     let mut policy = Policy::new(tuning, &made.kept(), &made.usable());
-    policy.set_learning(clock::ticks());
+    policy.learns = clock::ticks();
     policy
 }

@@ -1,13 +1,13 @@
 //! How an [`Adaptive`](super::Adaptive) came to its tuning, and where `save` writes what it learned.
 
 use super::instances::Instances;
+use super::warming::end;
 use crate::tuning::Tuning;
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
 
 /// How an [`Adaptive`](crate::Adaptive) came to its tuning.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -91,15 +91,8 @@ pub struct Start {
     pub background: Option<Background>,
 }
 
-/// The result of a start.
-pub struct Arrival {
-    /// How the tuning came about.
-    pub setup: Setup,
-    /// Saves what was learned; `None` without a cache.
-    pub save: Option<Save>,
-    /// The tuning with its algorithms; `None`: the usual tuning stays.
-    pub tuning: Option<(Tuning, Instances)>,
-}
+/// The result of a start. Without a tuning the usual one stays.
+pub type Arrival = (Start, Option<(Tuning, Instances)>);
 
 impl Start {
     /// Returns the start of a clone, for which nothing will arrive.
@@ -125,12 +118,12 @@ impl Start {
     pub(super) fn arrived(&mut self) -> Option<(Tuning, Instances)> {
         let thread = self.background.as_mut()?.thread.take_if(|thread| thread.is_finished())?;
         self.background = None;
-        let Ok(Arrival { setup, save, tuning }) = thread.join() else {
+        let Ok((start, tuning)) = thread.join() else {
             self.setup.origin = Origin::Usual;
             self.setup.remarks.push("the background thread panicked: the usual tuning stays".to_owned());
             return None;
         };
-        (self.setup, self.save) = (setup, save);
+        *self = start;
         tuning
     }
 }
@@ -143,24 +136,10 @@ pub struct Background {
     pub stop: Arc<AtomicBool>,
 }
 
-impl Background {
-    /// How long a drop waits. The thread looks at the flag after each sample, of which the longest take tenths of a
-    /// second; the driver of a GPU may hold it longer.
-    const LAST_WAIT: Duration = Duration::from_secs(2);
-}
-
 impl Drop for Background {
+    // It looks at the flag after each sample, of which the longest take tenths of a second.
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
-        let Some(thread) = self.thread.take() else { return };
-        let began = Instant::now();
-        while !thread.is_finished() {
-            if began.elapsed() > Self::LAST_WAIT {
-                return;
-            }
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        // A panic has already been printed.
-        let _ = thread.join();
+        end(self.thread.take());
     }
 }

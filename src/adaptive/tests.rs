@@ -102,25 +102,43 @@ fn steps_whose_algorithm_has_no_cost_are_passed_over() {
     }
 }
 
-/// Works for a few frames, then is lost as a GPU can be.
-struct Fragile(u32);
+/// Finds no pair, and does this in each frame and to get ready.
+struct MadeUp<F, P>(F, P);
 
-impl BroadPhase for Fragile {
+impl<F: FnMut() -> Result<(), Error> + Send + Sync, P: Fn() + Send + Sync> BroadPhase for MadeUp<F, P> {
     fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
-        if self.0 == 0 {
-            let algorithm = "fragile@gpu0".parse().unwrap();
-            return Err(Error::Unavailable { algorithm, reason: "lost".into() });
-        }
-        self.0 -= 1;
         pairs.clear();
+        self.0()?;
         pairs.finish()
+    }
+
+    fn prepare(&mut self, _: usize) {
+        self.1();
+    }
+}
+
+/// Works for some frames, then is lost as a GPU can be.
+fn fragile(mut frames: u32) -> Result<Box<dyn BroadPhase>, Error> {
+    let lost = || Error::Unavailable { algorithm: "fragile@gpu0".parse().unwrap(), reason: "lost".into() };
+    let frame = move || {
+        frames = frames.checked_sub(1).ok_or_else(lost)?;
+        Ok(())
+    };
+    Ok(Box::new(MadeUp(frame, || {})))
+}
+
+/// A frame that takes this many nanoseconds of the counted clock.
+fn spends(ns: f64) -> impl FnMut() -> Result<(), Error> {
+    move || {
+        clock::counted::spend(ns);
+        Ok(())
     }
 }
 
 #[test]
 fn a_lost_algorithm_is_replaced_within_the_frame() {
     let mut registry = Registry::with_cores(1);
-    registry.add("fragile@gpu0".parse().unwrap(), 1, || Ok(Box::new(Fragile(2))));
+    registry.add("fragile@gpu0".parse().unwrap(), 1, || fragile(2));
     let tuning = tuning(&[("fragile@gpu0", 1.0, 0.0), ("brute@cpu1", 2.0, 1.0)]);
     let mut adaptive = Adaptive::new(tuning, &registry).unwrap();
     assert_eq!(chosen(&mut adaptive, 30).0, "fragile@gpu0");
@@ -152,22 +170,11 @@ impl BroadPhase for Told {
     }
 }
 
-/// Takes this many nanoseconds of the counted clock.
-struct Spends(f64);
-
-impl BroadPhase for Spends {
-    fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
-        clock::counted::spend(self.0);
-        pairs.clear();
-        pairs.finish()
-    }
-}
-
 #[test]
 fn frames_below_four_ticks_teach_nothing() {
     let learned = |ns: f64| {
         let mut registry = Registry::with_cores(1);
-        registry.add("spends@cpu1".parse().unwrap(), 1, move || Ok(Box::new(Spends(ns))));
+        registry.add("spends@cpu1".parse().unwrap(), 1, move || Ok(Box::new(MadeUp(spends(ns), || {}))));
         let mut adaptive = Adaptive::new(tuning(&[("spends@cpu1", 2e5, 0.0)]), &registry).unwrap();
         clock::counted::set_tick(Duration::from_micros(100));
         clock::counted::run(|| (0..50).for_each(|_| _ = chosen(&mut adaptive, 30)));
@@ -259,7 +266,7 @@ fn samples_until(adaptive: &mut Adaptive, scene: &mut Scene, algorithm: &str) ->
     for _ in 0..1_000_000 {
         adaptive.find_pairs(scene.boxes(), &mut pairs).unwrap();
         scene.advance();
-        samples += u32::from(adaptive.runner.tracker.age() == 1);
+        samples += u32::from(adaptive.runner.tracker.age == 1);
         if adaptive.last_decision().unwrap().algorithm.to_string() == algorithm {
             return samples;
         }
@@ -291,7 +298,7 @@ fn a_frame_that_stands_out_is_compared_with_the_one_before_it() {
     // Nobody has decided on this one.
     tracker.ran(&at(1), 100);
     tracker.update(&at(2));
-    let moved = tracker.moved().unwrap();
+    let moved = tracker.motion.unwrap().moved;
     assert!((moved - 0.25).abs() < 0.01, "{moved}");
 }
 

@@ -6,23 +6,21 @@ use std::sync::mpsc;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// How long who ends waits for an algorithm that is getting ready: a driver may hold it longer, up to the limit of
-/// its GPU. The thread then ends by itself, and what it holds with it.
+/// How long a drop waits for a thread. A driver may hold it longer, up to the limit of its GPU: the thread then ends by
+/// itself, and what it holds with it.
 const LAST_WAIT: Duration = Duration::from_secs(2);
 
 /// Where an algorithm is.
 pub(super) enum Place {
     Here(Box<dyn BroadPhase>),
     /// On the thread that gets it ready and returns it.
-    Away(Away),
-    /// It panicked while it got ready.
+    Away(Preparing),
+    /// It could not be made, failed, or panicked while it got ready.
     Gone,
 }
 
 /// An algorithm on a thread.
-pub(super) struct Away {
-    thread: Option<JoinHandle<Option<Box<dyn BroadPhase>>>>,
-}
+pub(super) struct Preparing(Option<JoinHandle<Option<Box<dyn BroadPhase>>>>);
 
 impl Place {
     /// The algorithm, unless it is away or gone.
@@ -50,7 +48,7 @@ impl Place {
                 };
                 // Handed over only now: a closure that can't be started is dropped with all that it holds.
                 *self = match hand_over.send(algorithm) {
-                    Ok(()) => Self::Away(Away { thread: Some(thread) }),
+                    Ok(()) => Self::Away(Preparing(Some(thread))),
                     Err(mpsc::SendError(algorithm)) => Self::Here(algorithm),
                 };
             }
@@ -60,17 +58,21 @@ impl Place {
 
     /// Takes the algorithm back if it is ready.
     pub(super) fn take_back(&mut self) {
-        if matches!(self, Self::Away(away) if away.is_done()) {
+        if matches!(self, Self::Away(Preparing(thread)) if thread.as_ref().is_none_or(JoinHandle::is_finished)) {
             self.wait();
         }
     }
 
     /// Takes the algorithm back, however long that takes.
     pub(super) fn wait(&mut self) {
-        if let Self::Away(away) = self {
-            let returned = away.thread.take().and_then(|thread| thread.join().ok().flatten());
+        if let Self::Away(Preparing(thread)) = self {
+            let returned = thread.take().and_then(|thread| thread.join().ok().flatten());
             *self = returned.map_or(Self::Gone, Self::Here);
         }
+    }
+
+    pub(super) fn is_here(&self) -> bool {
+        matches!(self, Self::Here(_))
     }
 
     pub(super) fn is_away(&self) -> bool {
@@ -78,21 +80,22 @@ impl Place {
     }
 }
 
-impl Away {
-    fn is_done(&self) -> bool {
-        self.thread.as_ref().is_none_or(JoinHandle::is_finished)
+impl Drop for Preparing {
+    fn drop(&mut self) {
+        end(self.0.take());
     }
 }
 
-impl Drop for Away {
-    fn drop(&mut self) {
-        let began = Instant::now();
-        while !self.is_done() && began.elapsed() < LAST_WAIT {
-            std::thread::sleep(Duration::from_millis(1));
+/// Waits for a thread whose result nobody wants any more.
+pub(super) fn end<T>(thread: Option<JoinHandle<T>>) {
+    let Some(thread) = thread else { return };
+    let began = Instant::now();
+    while !thread.is_finished() {
+        if began.elapsed() > LAST_WAIT {
+            return;
         }
-        if self.is_done() {
-            // A panic of it was reported when it happened.
-            let _ = self.thread.take().map(JoinHandle::join);
-        }
+        std::thread::sleep(Duration::from_millis(1));
     }
+    // A panic of it was reported when it happened.
+    let _ = thread.join();
 }

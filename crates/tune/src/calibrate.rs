@@ -11,7 +11,7 @@ use crate::measure;
 use crate::model::Model;
 use cache::CacheFile;
 use sapwise::algorithm::Entry;
-use sapwise::internals::{Arrival, Background, Instances, Origin, Setup, Start};
+use sapwise::internals::{Arrival, Background, Instances, Origin, Start};
 use sapwise::{Adaptive, Error};
 use sapwise::{Registry, Tuning};
 use std::sync::Arc;
@@ -40,12 +40,12 @@ pub fn for_this_machine(options: &StartOptions) -> Result<Adaptive, Error> {
         return in_background(options, began);
     }
     let registry = options.registry.clone().unwrap_or_else(|| Arc::new(usual_registry()));
-    let Arrival { setup, save, tuning } = arrive(options, &registry, began, Arc::default());
+    let (start, tuning) = arrive(options, &registry, began, Arc::default());
     let mut adaptive = match tuning {
         Some((tuning, made)) => Adaptive::with(tuning, made),
         None => Adaptive::new(Tuning::usual(&registry), &registry)?,
     };
-    adaptive.set_start(Start { setup, save, background: None });
+    adaptive.set_start(start);
     Ok(adaptive)
 }
 
@@ -66,9 +66,9 @@ fn in_background(options: &StartOptions, began: Instant) -> Result<Adaptive, Err
         Err(e) => (Origin::Usual, vec![format!("no background thread can be started ({e}): the usual tuning stays")]),
     };
     let background = thread.ok().map(|thread| Background { thread: Some(thread), stop });
-    let mut setup = Setup::default();
-    (setup.origin, setup.remarks) = (origin, remarks);
-    adaptive.set_start(Start { setup, save: None, background });
+    let mut start = Start { background, ..Start::default() };
+    (start.setup.origin, start.setup.remarks) = (origin, remarks);
+    adaptive.set_start(start);
     Ok(adaptive)
 }
 
@@ -89,33 +89,29 @@ fn arrive(options: &StartOptions, registry: &Registry, began: Instant, stop: Arc
     let mut remarks = Vec::new();
     let found = find(options, registry, &stop, &mut remarks);
     let mut arrival = arrival(found, registry, remarks);
-    arrival.setup.seconds = began.elapsed().as_secs_f64();
+    arrival.0.setup.seconds = began.elapsed().as_secs_f64();
     arrival
 }
 
 /// Makes the algorithms of a tuning that was found.
 fn arrival(found: Option<Found>, registry: &Registry, remarks: Vec<String>) -> Arrival {
-    let mut setup = Setup::default();
-    (setup.origin, setup.remarks) = (Origin::Usual, remarks);
-    let mut arrival = Arrival { setup, save: None, tuning: None };
-    if let Some(Found { tuning, origin, measured, file, sound }) = found {
-        let tuning = tuning.for_running();
-        let mut made = Instances::of(&tuning, registry);
-        if let Some(e) = made.failure() {
-            arrival.setup.remarks.push(format!("no algorithm of the predicted tuning can be made: {e:#}"));
-        } else {
-            arrival.setup.origin = origin;
-            arrival.setup.file = file.as_ref().filter(|_| sound).map(|file| file.path().to_owned());
-            arrival.save = file.map(|file| {
-                let write = move |learned: &Tuning| {
-                    if sound { file.write(learned, measured).map(|()| true) } else { Ok(false) }
-                };
-                Arc::new(write) as _
-            });
-            arrival.tuning = Some((tuning, made));
-        }
+    let mut start = Start::default();
+    (start.setup.origin, start.setup.remarks) = (Origin::Usual, remarks);
+    let Some(Found { tuning, origin, measured, file, sound }) = found else { return (start, None) };
+    let tuning = tuning.for_running();
+    let mut made = Instances::of(&tuning, registry);
+    if let Some(e) = made.failure() {
+        start.setup.remarks.push(format!("no algorithm of the predicted tuning can be made: {e:#}"));
+        return (start, None);
     }
-    arrival
+    start.setup.origin = origin;
+    start.setup.file = file.as_ref().filter(|_| sound).map(|file| file.path().to_owned());
+    start.save = file.map(|file| {
+        let write =
+            move |learned: &Tuning| if sound { file.write(learned, measured).map(|()| true) } else { Ok(false) };
+        Arc::new(write) as _
+    });
+    (start, Some((tuning, made)))
 }
 
 /// A tuning of this machine.
@@ -238,10 +234,10 @@ mod tests {
             let (tuning, path) = (Tuning::usual(&registry), file.path().to_owned());
             let file = Some(file);
             let found = Found { tuning, origin: Origin::Probed, measured: SystemTime::now(), file, sound };
-            let Arrival { setup, save, tuning } = arrival(Some(found), &registry, Vec::new());
+            let (start, tuning) = arrival(Some(found), &registry, Vec::new());
             let (tuning, made) = tuning.unwrap();
             let mut adaptive = Adaptive::with(tuning, made);
-            adaptive.set_start(Start { setup, save, background: None });
+            adaptive.set_start(start);
             assert_eq!((adaptive.save().unwrap(), path.exists()), (sound, sound));
             assert_eq!(adaptive.setup().file, sound.then_some(path));
         }

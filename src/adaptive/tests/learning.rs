@@ -71,7 +71,7 @@ fn run_told(
     truth: &Truth,
     work: &dyn Fn(usize, usize) -> Option<FrameWork>,
 ) -> Vec<Frame> {
-    let count = policy.tuning().costs.len();
+    let count = policy.tuning.costs.len();
     let mut chance = Chance(17);
     let load = Load { objects, ..Load::default() };
     let mut running: Option<(Choice, Epoch, Option<FrameWork>)> = None;
@@ -173,7 +173,7 @@ fn without_learning_wrong_tuning_stay_wrong() {
     let wrong = tuning(&[("grid-sap@cpu1", 0.0, 100.0), ("brute@cpu1", 0.0, 120.0)]);
     let truth = |k: usize, n: f64, _: usize| n * [300.0, 100.0][k];
     let mut policy = policy(wrong);
-    policy.set_learning(false);
+    policy.learns = false;
     assert!(run(&mut policy, 0..500, 1000, &truth).iter().all(|f| f.chosen == 0));
     assert!(!policy.has_learned());
 }
@@ -243,7 +243,7 @@ fn exploring_is_rare_bounded_and_can_be_turned_off() {
     let spent: f64 = frames.iter().map(|f| f.cheapest_ns).sum();
     assert!(price <= 0.01 * spent, "{price} of {spent}");
     let mut quiet = policy(near());
-    quiet.set_exploring(false);
+    quiet.explores = false;
     assert!(run(&mut quiet, 0..4000, 1000, &truth).iter().all(|f| f.reason != Reason::Explored));
     // What is expected to cost over twice as much is not tried.
     let far = tuning(&[("grid-sap@cpu1", 0.0, 100.0), ("brute@cpu1", 0.0, 210.0)]);
@@ -255,7 +255,7 @@ fn exploring_is_rare_bounded_and_can_be_turned_off() {
 fn load_that_flickers_about_a_crossover_causes_no_switch() {
     // 100 n and 50 n + 50 000 cross at 1000.
     let mut policy = policy(tuning(&[("grid-sap@cpu1", 0.0, 100.0), ("sap@cpu1", 50_000.0, 50.0)]));
-    policy.set_learning(false);
+    policy.learns = false;
     for k in 0..300 {
         let choice = policy.choose(&Load::of_objects([1010, 1000, 989][k % 3])).unwrap();
         ran(&mut policy, choice.chosen, 1e5, None);

@@ -36,29 +36,16 @@ impl Gate {
     }
 }
 
-/// Brute force behind a driver that keeps it waiting.
-struct Slow(Box<dyn BroadPhase>, Arc<Gate>);
-
-impl BroadPhase for Slow {
-    fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
-        self.0.find_pairs(boxes, pairs)
-    }
-
-    fn prepare(&mut self, _: usize) {
-        self.1.pass();
-    }
-}
-
 /// The module over `slow@gpu0` and one other.
 fn beside(other: &str, costs: [(f64, f64); 2]) -> (Adaptive, Arc<Gate>) {
     let gate = Arc::<Gate>::default();
     let mut registry = Registry::with_cores(1);
     let made = Arc::clone(&gate);
     registry.add("slow@gpu0".parse().unwrap(), 1, move || {
-        let brute = Registry::with_cores(1).create(&"brute@cpu1".parse().unwrap())?;
-        Ok(Box::new(Slow(brute, Arc::clone(&made))))
+        let gate = Arc::clone(&made);
+        Ok(Box::new(MadeUp(|| Ok(()), move || gate.pass())))
     });
-    registry.add("fragile@gpu1".parse().unwrap(), 1, || Ok(Box::new(Fragile(3))));
+    registry.add("fragile@gpu1".parse().unwrap(), 1, || fragile(3));
     let [(call, object), (slow_call, slow_object)] = costs;
     let tuning = tuning(&[(other, call, object), ("slow@gpu0", slow_call, slow_object)]);
     let mut adaptive = Adaptive::new(tuning, &registry).unwrap();
@@ -115,18 +102,8 @@ fn what_gets_ready_ends_with_the_module() {
 
 #[test]
 fn one_that_panics_while_it_gets_ready_is_never_chosen() {
-    struct Panics;
-    impl BroadPhase for Panics {
-        fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
-            pairs.clear();
-            pairs.finish()
-        }
-        fn prepare(&mut self, _: usize) {
-            panic!("of the test");
-        }
-    }
     let mut registry = Registry::with_cores(1);
-    registry.add("panics@gpu0".parse().unwrap(), 1, || Ok(Box::new(Panics)));
+    registry.add("panics@gpu0".parse().unwrap(), 1, || Ok(Box::new(MadeUp(|| Ok(()), || panic!("of the test")))));
     let tuning = tuning(&[("brute@cpu1", 0.0, 10.0), ("panics@gpu0", 500.0, 5.0)]);
     let mut adaptive = Adaptive::new(tuning, &registry).unwrap();
     adaptive.set_learning(false);
@@ -138,21 +115,6 @@ fn one_that_panics_while_it_gets_ready_is_never_chosen() {
     }
 }
 
-/// Takes so many nanoseconds of the counted clock, and its driver as long as the gate says to get it ready.
-struct Timed(f64, Arc<Gate>);
-
-impl BroadPhase for Timed {
-    fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
-        clock::counted::spend(self.0);
-        pairs.clear();
-        pairs.finish()
-    }
-
-    fn prepare(&mut self, _: usize) {
-        self.1.pass();
-    }
-}
-
 #[test]
 fn what_is_settled_on_is_here_when_a_trial_of_another_one_ends() {
     let (gate, open) = (Arc::<Gate>::default(), Arc::<Gate>::default());
@@ -160,7 +122,10 @@ fn what_is_settled_on_is_here_when_a_trial_of_another_one_ends() {
     let mut registry = Registry::with_cores(1);
     for (id, ns, gate) in [("settled@gpu0", 1e6, &gate), ("near@cpu1", 1.2e6, &open)] {
         let gate = Arc::clone(gate);
-        registry.add(id.parse().unwrap(), 1, move || Ok(Box::new(Timed(ns, Arc::clone(&gate)))));
+        registry.add(id.parse().unwrap(), 1, move || {
+            let gate = Arc::clone(&gate);
+            Ok(Box::new(MadeUp(spends(ns), move || gate.pass())))
+        });
     }
     let tuning = tuning(&[("settled@gpu0", 1e6, 0.0), ("near@cpu1", 1.2e6, 0.0)]);
     let mut adaptive = Adaptive::new(tuning, &registry).unwrap();
