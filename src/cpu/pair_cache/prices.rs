@@ -36,8 +36,9 @@ pub(super) struct Prices {
     /// Number of frames from scratch, and cost of the mean one.
     frames: u32,
     of_scratch: MeanTime,
-    /// Cost of the mean frame with kept pairs, over that.
+    /// Cost of the mean frame with kept pairs, over that; whether it was measured beside that, for as many boxes.
     keeping: MeanTime,
+    is_beside: bool,
     /// On how many threads pairs are kept, and found from scratch.
     pub(super) keepers: Width,
     pub(super) searchers: Width,
@@ -67,6 +68,7 @@ impl Prices {
             frames: 0,
             of_scratch: MeanTime::default(),
             keeping: MeanTime::default(),
+            is_beside: false,
             keepers: Width::new(0),
             searchers: Width::new(0),
             lost: 0.0,
@@ -78,8 +80,8 @@ impl Prices {
 
     /// Forgets what a box costs, and not how keeping and finding from scratch compare.
     pub(super) fn forget(&mut self, [keepers, searchers]: [Width; 2]) {
-        (self.frames, self.of_scratch, self.keepers) = (0, MeanTime::default(), keepers);
-        self.searchers = searchers;
+        (self.frames, self.of_scratch, self.is_beside) = (0, MeanTime::default(), false);
+        (self.keepers, self.searchers) = (keepers, searchers);
     }
 
     /// Learns from a frame from scratch, of which the model says `model`.
@@ -98,8 +100,10 @@ impl Prices {
         }
         self.of_scratch.add(cost);
         // A frame with kept pairs takes as long as before: the first frames after a build told too little.
-        let over = before / self.of_scratch.get().unwrap_or(cost);
-        self.change_keeping(|keeping| keeping * over);
+        if self.is_beside {
+            let over = before / self.of_scratch.get().unwrap_or(cost);
+            self.change_keeping(|keeping| keeping * over);
+        }
     }
 
     fn change_keeping(&mut self, change: impl Fn(f64) -> f64) {
@@ -170,7 +174,7 @@ impl Prices {
         let mut most = MOST_OF_FIRST * scratch;
         if !is_first {
             most = MOST_RISE * expected * self.measured() as f32;
-            self.keeping = MeanTime::of(self.measured());
+            (self.keeping, self.is_beside) = (MeanTime::of(self.measured()), true);
             self.keeping.add(f64::from(took / expected));
         }
         // NaN, of 0 over 0, counts as 0.
@@ -285,6 +289,19 @@ mod tests {
             !begins(&mut prices, 0.1, 32.0, 40.0)
         });
         assert!((1..12).contains(&frames.count()));
+    }
+
+    #[test]
+    fn number_of_boxes_that_changes_often_does_not_make_keeping_look_cheap() {
+        let mut prices = keeping();
+        (0..100).for_each(|_| assert!(prices.pays(Some(40.0), 30.0, 40.0)));
+        let before = prices.measured();
+        for _ in 0..20 {
+            prices.forget([0; 2].map(Width::new));
+            // The first frames after a build are cheap.
+            (0..20).for_each(|k| prices.add_scratch(Some(if k < 6 { 50.0 } else { 60.0 }), 40.0));
+        }
+        assert_eq!(prices.measured(), before);
     }
 
     #[test]
