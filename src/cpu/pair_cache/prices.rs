@@ -78,10 +78,13 @@ impl Prices {
         }
     }
 
-    /// Forgets what a box costs, and not how keeping and finding from scratch compare.
+    /// Forgets what a box costs, and half of how keeping and finding from scratch compare: with a tenth of the boxes
+    /// keeping may take twice as long for each, beside finding from scratch. In `uniform` that swings between 50 and
+    /// 3000 boxes, frames take 0.74 to 0.82 times as long as if all of it is remembered.
     pub(super) fn forget(&mut self, [keepers, searchers]: [Width; 2]) {
         (self.frames, self.of_scratch, self.is_beside) = (0, MeanTime::default(), false);
         (self.keepers, self.searchers) = (keepers, searchers);
+        self.change_keeping(f64::sqrt);
     }
 
     /// Learns from a frame from scratch, of which the model says `model`.
@@ -295,11 +298,12 @@ mod tests {
     fn number_of_boxes_that_changes_often_does_not_make_keeping_look_cheap() {
         let mut prices = keeping();
         (0..100).for_each(|_| assert!(prices.pays(Some(40.0), 30.0, 40.0)));
-        let before = prices.measured();
+        let mut before = prices.measured();
         for _ in 0..20 {
             prices.forget([0; 2].map(Width::new));
             // The first frames after a build are cheap.
             (0..20).for_each(|k| prices.add_scratch(Some(if k < 6 { 50.0 } else { 60.0 }), 40.0));
+            before = before.sqrt();
         }
         assert_eq!(prices.measured(), before);
     }
