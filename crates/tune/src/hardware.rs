@@ -60,7 +60,6 @@ pub struct Machine {
 
 impl Machine {
     /// Creates a machine of which only the [`physical_id`](Self::physical_id) is known.
-    #[must_use]
     pub fn of(physical_id: impl Into<String>) -> Self {
         Self { physical_id: physical_id.into(), ..Self::default() }
     }
@@ -68,7 +67,6 @@ impl Machine {
     /// Returns the name of the tuning file for machines of this kind, which `sapwise predict --report FOLDER` writes:
     /// physical id, SIMD level, usable cores and the device numbers of its GPUs, as in
     /// `478e43ba2e7824ab-avx512-16-10de2335.json`. Software adapters are left out.
-    #[must_use]
     pub fn tuning_file(&self, cores: u32, gpus: &[GpuIdentity]) -> String {
         // A driver's text and a report of a stranger may hold any character.
         let plain = |text: &str| text.chars().filter(char::is_ascii_alphanumeric).collect::<String>();
@@ -82,7 +80,6 @@ impl Machine {
 
 impl Hardware {
     /// Creates a machine with these parameters and without GPUs.
-    #[must_use]
     pub fn new(machine: Machine, parameters: Vec<Parameter>) -> Self {
         Self { machine, parameters, gpus: Vec::new(), gpu_groups: Vec::new() }
     }
@@ -100,31 +97,26 @@ impl Hardware {
     }
 
     /// Returns the value of a parameter unless it is missing.
-    #[must_use]
     pub fn value(&self, id: ParameterId) -> Option<f64> {
         self.value_named(id.as_str())
     }
 
     /// Returns the value of a parameter by its name, which this version need not know.
-    #[must_use]
     pub fn value_named(&self, name: &str) -> Option<f64> {
         Parameter::find(&self.parameters, name)?.value
     }
 
     /// Returns the GPU of a number if it was measured.
-    #[must_use]
     pub fn gpu(&self, index: u32) -> Option<&GpuHardware> {
         self.gpus.iter().find(|g| g.gpu.index == index)
     }
 
     /// Returns the group of the GPUs of these numbers, ascending, if it was measured.
-    #[must_use]
     pub fn gpu_group(&self, indices: &[u32]) -> Option<&GpuGroup> {
         self.gpu_groups.iter().find(|g| g.gpus == indices)
     }
 
     /// Returns what disturbed the measurement, in sentences: foreign load, and cores that moved.
-    #[must_use]
     pub fn disturbed(&self) -> Vec<String> {
         self.lists().filter_map(|(of, list)| loaded(&of, list)).chain(moved(&self.parameters)).collect()
     }
@@ -138,7 +130,6 @@ impl Hardware {
     }
 
     /// Returns what makes the description unusable, if anything: an impossible value, or something listed twice.
-    #[must_use]
     pub fn defect(&self) -> Option<HardwareError> {
         if let Some(defect) = self.lists().find_map(|(of, list)| Parameter::defect(&of, list)) {
             return Some(defect);

@@ -119,7 +119,6 @@ pub struct ModelTerm {
 
 impl MethodModel {
     /// Creates a method without terms on one thread of a class of processor.
-    #[must_use]
     pub fn new(method: impl Into<String>, backend: BackendClass, revision: u32) -> Self {
         Self {
             method: method.into(),
@@ -165,7 +164,6 @@ impl MethodModel {
 
 impl Model {
     /// Creates a model of these methods from the ranges of its training.
-    #[must_use]
     pub fn new(name: impl Into<String>, methods: Vec<MethodModel>, ranges: Vec<Range>) -> Self {
         Self { name: name.into(), ranges, ratios_90_ln: None, places: Arc::new(Places::new(Vec::new())), methods }
     }
@@ -184,7 +182,6 @@ impl Model {
 
     /// Returns the hardware parameters that a prediction reads, without those of GPUs, each once: for costs and for
     /// ranges.
-    #[must_use]
     pub fn parameters(&self) -> Vec<ParameterId> {
         let of_method = |m: &MethodModel| {
             let scales = m.terms.iter().flat_map(|t| t.scale.parameters());
@@ -202,7 +199,6 @@ impl Model {
     }
 
     /// Returns what makes this model unusable, if anything.
-    #[must_use]
     pub fn defect(&self) -> Option<String> {
         let places = self.places.loads();
         let is_wrong = |r: &&Range| !(r.min.is_finite() && r.max.is_finite() && r.min <= r.max);

@@ -6,7 +6,6 @@ pub use sapwise::internals::stats::NORMAL_90;
 
 /// Returns the `q`-quantile, `q` from 0 to 1, with linear interpolation between the two nearest samples (type 7 of
 /// Hyndman and Fan, the default of R and NumPy). `None` for no samples. A `q` outside 0 to 1 is clamped.
-#[must_use]
 pub fn quantile(samples: &[f64], q: f64) -> Option<f64> {
     let mut sorted: Vec<f64> = samples.iter().copied().filter(|x| !x.is_nan()).collect();
     sorted.sort_unstable_by(f64::total_cmp);
@@ -22,13 +21,11 @@ pub fn quantile(samples: &[f64], q: f64) -> Option<f64> {
 }
 
 /// Returns the median. `None` for no samples.
-#[must_use]
 pub fn median(samples: &[f64]) -> Option<f64> {
     quantile(samples, 0.5)
 }
 
 /// Returns the mean; 0 for no values.
-#[must_use]
 pub fn mean(values: &[f64]) -> f64 {
     if values.is_empty() { 0.0 } else { values.iter().sum::<f64>() / values.len() as f64 }
 }
@@ -38,7 +35,6 @@ const NORMAL_OVER_MAD: f64 = 1.4826;
 
 /// Returns a standard deviation that outliers don't move: the median absolute deviation from the median, scaled for a
 /// normal distribution. `None` for no samples.
-#[must_use]
 pub fn robust_deviation(samples: &[f64]) -> Option<f64> {
     let middle = median(samples)?;
     let away: Vec<f64> = samples.iter().map(|x| (x - middle).abs()).collect();
@@ -48,7 +44,6 @@ pub fn robust_deviation(samples: &[f64]) -> Option<f64> {
 /// Returns the interquartile range over the median, a dispersion without a unit.
 ///
 /// `None` for fewer than four samples, and if the median is zero or infinite.
-#[must_use]
 pub fn relative_iqr(samples: &[f64]) -> Option<f64> {
     if samples.iter().filter(|x| !x.is_nan()).count() < 4 {
         return None;

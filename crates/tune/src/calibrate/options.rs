@@ -24,7 +24,6 @@ pub struct StartOptions {
 
 impl StartOptions {
     /// A start in the background, with the user's cache folder and two seconds of measurement.
-    #[must_use]
     pub fn new() -> Self {
         let user = etcetera::base_strategy::choose_native_strategy().ok();
         Self {

@@ -8,7 +8,6 @@ pub struct HardwareError(pub(super) String);
 
 impl HardwareError {
     /// Returns the problem without what to do about it.
-    #[must_use]
     pub fn problem(&self) -> &str {
         self.0.split_once("; ").map_or(&self.0, |(problem, _)| problem)
     }

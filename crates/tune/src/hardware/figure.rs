@@ -60,19 +60,16 @@ impl Parameter {
     pub const SPOILING: f64 = 0.05;
 
     /// Creates a parameter with a value that the system reports.
-    #[must_use]
     pub fn reported(name: impl AsRef<str>, value: f64, source: &str) -> Self {
         Self { how: How::Reported, value: Some(value), samples: 1, ..Self::missing(name, source) }
     }
 
     /// Creates a parameter with a measured value of which no samples are kept.
-    #[must_use]
     pub fn measured(name: impl AsRef<str>, value: f64, source: &str) -> Self {
         Self { how: How::Measured, ..Self::reported(name, value, source) }
     }
 
     /// Creates a parameter from measured samples. It is missing if the statistic has no value for them.
-    #[must_use]
     pub fn from_samples(name: impl AsRef<str>, statistic: Statistic, raw: Vec<f64>, source: &str) -> Self {
         let Some(value) = statistic.of(&raw) else {
             return Self::missing(name, &format!("no usable sample: {source}"));
@@ -87,7 +84,6 @@ impl Parameter {
     }
 
     /// Creates a parameter without a value.
-    #[must_use]
     pub fn missing(name: impl AsRef<str>, why: &str) -> Self {
         Self {
             name: name.as_ref().to_owned(),
@@ -109,7 +105,6 @@ impl Parameter {
     }
 
     /// Computes the value from the raw samples. `None` if none are kept.
-    #[must_use]
     pub fn recomputed(&self) -> Option<f64> {
         self.statistic.of(&self.raw)
     }

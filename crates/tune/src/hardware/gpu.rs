@@ -27,19 +27,16 @@ pub struct GpuGroup {
 
 impl GpuHardware {
     /// Creates a GPU with these parameters.
-    #[must_use]
     pub fn new(gpu: GpuIdentity, parameters: Vec<Parameter>) -> Self {
         Self { gpu, parameters }
     }
 
     /// Returns the value of a parameter unless it is missing.
-    #[must_use]
     pub fn value(&self, id: GpuParameterId) -> Option<f64> {
         self.value_named(id.as_str())
     }
 
     /// Returns the value of a parameter by its name, which this version need not know.
-    #[must_use]
     pub fn value_named(&self, name: &str) -> Option<f64> {
         Parameter::find(&self.parameters, name)?.value
     }
@@ -47,13 +44,11 @@ impl GpuHardware {
 
 impl GpuGroup {
     /// Creates a group of the GPUs of these numbers, ascending.
-    #[must_use]
     pub fn new(gpus: Vec<u32>, parameters: Vec<Parameter>) -> Self {
         Self { gpus, parameters }
     }
 
     /// Returns the value of a parameter unless it is missing.
-    #[must_use]
     pub fn value(&self, id: GpuParameterId) -> Option<f64> {
         Parameter::find(&self.parameters, id)?.value
     }

@@ -48,7 +48,6 @@ macro_rules! parameters {
 
         impl $name {
             /// Returns what is known about the parameter.
-            #[must_use]
             pub fn quantity(self) -> Quantity {
                 let (bounds, read_by_model) = match self {
                     $(Self::$variant => ($bounds, $read),)+

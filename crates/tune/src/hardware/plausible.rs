@@ -16,7 +16,6 @@ impl Bounds {
 
 impl Hardware {
     /// Returns the first parameter of the machine, without its GPUs, whose value no machine has.
-    #[must_use]
     pub fn implausible(&self) -> Option<HardwareError> {
         ParameterId::ALL.into_iter().find_map(|id| self.implausible_value(id))
     }
@@ -43,7 +42,6 @@ impl Hardware {
 
 impl GpuHardware {
     /// Returns the first parameter whose value no GPU has.
-    #[must_use]
     pub fn implausible(&self) -> Option<HardwareError> {
         let of = format!(" of gpu{}", self.gpu.index);
         GpuParameterId::ALL.into_iter().find_map(|id| id.quantity().bounds?.check(id.as_str(), &of, self.value(id)))

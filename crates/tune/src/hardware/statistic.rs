@@ -21,7 +21,6 @@ named! {
 
 impl Statistic {
     /// Computes the value; `None` for no samples and for a fit.
-    #[must_use]
     pub fn of(self, samples: &[f64]) -> Option<f64> {
         match self {
             Self::Median => stats::median(samples),
@@ -35,7 +34,6 @@ impl Statistic {
     }
 
     /// Whether it is the median, which files leave out.
-    #[must_use]
     pub fn is_median(&self) -> bool {
         *self == Self::Median
     }

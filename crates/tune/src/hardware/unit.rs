@@ -18,7 +18,6 @@ pub(super) fn unit(name: &str) -> &'static str {
 }
 
 /// Returns a parameter's value as people read it: rounded, with its unit.
-#[must_use]
 pub fn with_unit(name: &str, value: f64) -> String {
     match unit(name) {
         unit @ "GB/s" => format!("{value:.1} {unit}"),

@@ -16,19 +16,16 @@ pub struct Schema {
 
 impl Schema {
     /// The kind of file: the part before the slash.
-    #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
     /// The major version; files of different ones can't be read as each other.
-    #[must_use]
     pub fn major(&self) -> u32 {
         self.major
     }
 
     /// The minor version; a newer one only added keys.
-    #[must_use]
     pub fn minor(&self) -> u32 {
         self.minor
     }
@@ -113,7 +110,6 @@ impl Format {
     pub const MODEL: Self = Self::new("model", 5).skipping(&["training"]);
 
     /// A kind of file in the major version that the caller reads and writes.
-    #[must_use]
     pub const fn new(name: &'static str, major: u32) -> Self {
         Self { name, major, foreign: &[] }
     }

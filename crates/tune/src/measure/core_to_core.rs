@@ -41,7 +41,6 @@ pub(super) fn measure(options: &Options) -> Result<Vec<Parameter>, String> {
 ///
 /// Shows during a long measurement whether the machine stayed the same. `None` on one core, and if threads can't be
 /// bound or don't run.
-#[must_use]
 pub fn core_to_core_ns(options: &Options) -> Option<f64> {
     let all = pairs(options.usable_cores());
     let mut pairs: Vec<(CoreId, CoreId)> = all.first().into_iter().chain(all.last()).copied().collect();

@@ -31,19 +31,16 @@ impl Watch {
     }
 
     /// Returns the time after which foreign load differs from rounding; zero if foreign load is unknown here.
-    #[must_use]
     pub fn shortest(&self) -> Duration {
         self.before.map_or(Duration::ZERO, Counters::window)
     }
 
     /// Whether [`shortest`](Self::shortest) has passed.
-    #[must_use]
     pub fn is_long_enough(&self) -> bool {
         self.elapsed() >= self.shortest()
     }
 
     /// Returns the share of the CPU, 0 to 1, that other programs have taken since the begin. `None` if unknown.
-    #[must_use]
     pub fn foreign_load(&self) -> Option<f64> {
         self.before.zip(Counters::now()).map(|(before, now)| before.foreign_share(now, self.elapsed()))
     }

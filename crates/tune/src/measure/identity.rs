@@ -16,7 +16,6 @@ struct Cpu {
 
 /// Returns the identity of this machine, with a hash of CPU vendor, family, model, stepping and last-level cache as
 /// its id.
-#[must_use]
 pub fn machine() -> Machine {
     let cpu = Cpu::of_this_machine();
     let llc = cache_sizes::reported().last().map_or(0, |cache| cache.bytes);

@@ -60,7 +60,6 @@ named! {
 
 impl Family {
     /// Returns the parameters of this family, for a caller whose child process died.
-    #[must_use]
     pub fn parameters(self) -> Vec<ParameterId> {
         use ParameterId as P;
         match self {
@@ -142,7 +141,6 @@ impl Options {
 ///
 /// A caller that wants to survive a crash runs each family in a child process and combines the answers with
 /// [`assemble`].
-#[must_use]
 pub fn family(family: Family, options: &Options) -> Vec<Parameter> {
     let measured = match family {
         Family::Topology => Ok(topology::measure(options)),
@@ -157,7 +155,6 @@ pub fn family(family: Family, options: &Options) -> Vec<Parameter> {
 }
 
 /// Measures every family in this process.
-#[must_use]
 pub fn hardware(options: &Options) -> Hardware {
     hardware_for(&ParameterId::ALL, options)
 }
@@ -165,7 +162,6 @@ pub fn hardware(options: &Options) -> Hardware {
 /// Measures the families that hold any of these parameters; the others are missing.
 ///
 /// [`Model::parameters`](crate::Model::parameters) lists what a prediction needs.
-#[must_use]
 pub fn hardware_for(parameters: &[ParameterId], options: &Options) -> Hardware {
     let began = Instant::now();
     let holds = |family: &Family| family.parameters().iter().any(|id| parameters.contains(id));
@@ -189,7 +185,6 @@ pub fn hardware_for(parameters: &[ParameterId], options: &Options) -> Hardware {
 /// Puts parameters into the order of a report: each of [`ParameterId::ALL`] once.
 ///
 /// Of several parameters with one name it keeps the first. Absent parameters become missing; unknown names are dropped.
-#[must_use]
 pub fn assemble(machine: crate::hardware::Machine, measured: Vec<Parameter>) -> Hardware {
     Hardware::new(machine, in_order(&ParameterId::ALL, &measured, "not measured"))
 }

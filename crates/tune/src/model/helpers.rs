@@ -38,7 +38,6 @@ pub struct ThreadFigures {
 impl ThreadFigures {
     /// Creates the figures from a cycle and a cold fork and join in nanoseconds, and work of several threads over
     /// work of one.
-    #[must_use]
     pub const fn new(cycle_ns: f64, fork_join_cold_ns: f64, scaling: f64) -> Self {
         Self { cycle_ns, fork_join_cold_ns, scaling }
     }
@@ -65,7 +64,6 @@ impl HelpersModel {
     ];
 
     /// Creates a model from the values of its fields.
-    #[must_use]
     pub const fn new(call_cycles: f64, late_share: f64, serial_share: f64, boxes_per_thread: u32) -> Self {
         Self { call_cycles, late_share, serial_share, boxes_per_thread }
     }
@@ -79,7 +77,6 @@ impl HelpersModel {
     }
 
     /// Returns the helpers of `threads` threads with these figures.
-    #[must_use]
     pub fn with(&self, figures: ThreadFigures, threads: u32) -> Helpers {
         let mut helpers = Helpers::new(threads);
         helpers.call_ns = self.call_cycles * f64::from(threads.max(1) - 1) * figures.cycle_ns;

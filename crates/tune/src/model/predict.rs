@@ -126,7 +126,6 @@ impl Model {
     }
 
     /// Returns the cost model of an algorithm's method on its class of processor.
-    #[must_use]
     pub fn method(&self, id: &AlgorithmId) -> Option<&MethodModel> {
         self.of_method(id.method(), id.backend().class())
     }
@@ -175,7 +174,6 @@ impl Prediction {
     /// The interval of a crossover is the range in which the ratio of the two costs is nearer to one than nine of ten
     /// such ratios were to their prediction on held-out machines. There is none if fewer than two were held out, or
     /// if the machine is extrapolated.
-    #[must_use]
     pub fn tuning(self, scenario: &str, loads: &[Load]) -> Tuning {
         let within = self.ratios_90_ln.filter(|_| !self.extrapolated);
         let spread = |_: usize, _: usize, _: &Load| within.unwrap_or(0.0) / NORMAL_90;

@@ -35,7 +35,6 @@ impl GroupResidual {
     }
 
     /// Returns the covariance of the residuals of two positions under the same load.
-    #[must_use]
     pub fn covariance(a: &[f64], b: &[f64]) -> f64 {
         let squared: f64 = a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum();
         SHARED_LN.powi(2) + ALIKE_LN.powi(2) * (-0.5 * squared).exp()
@@ -43,7 +42,6 @@ impl GroupResidual {
 
     /// Returns the weights at a position: the sum of those of all groups, each times its covariance with it. Empty
     /// without groups.
-    #[must_use]
     pub fn weights_at(groups: &[Self], at: &[f64]) -> Vec<f64> {
         let mut sum = vec![0.0; groups.first().map_or(0, |g| g.weights.len())];
         for group in groups {

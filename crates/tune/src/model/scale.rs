@@ -45,7 +45,6 @@ named! {
 
 impl Scale {
     /// Returns whether a method on that class of processor may have it.
-    #[must_use]
     pub fn is_of(self, class: BackendClass) -> bool {
         match self {
             // The CPU works for a GPU too: it copies boxes and pairs.
@@ -57,7 +56,6 @@ impl Scale {
 
     /// Returns the hardware parameters of the machine that [`nanoseconds`](Self::nanoseconds) reads; none for a scale
     /// of GPUs.
-    #[must_use]
     pub fn parameters(self) -> &'static [ParameterId] {
         match self {
             Self::Cycle => &[ParameterId::ClockMeasuredGhz, ParameterId::ClockReportedGhz],
