@@ -43,7 +43,6 @@ struct Search {
 /// samples of all ranks in one place it does nothing. All ranks pass the same `shares`, whose sum is 1, and get the
 /// same cuts. It takes a few passes over the samples for each doubling of ranks, and sums at most 6 KiB a rank in a
 /// pass.
-#[must_use]
 pub fn bisect(samples: &mut [Sample], shares: &[f64], sum: &mut dyn FnMut(&mut [u64])) -> Cuts {
     let mut planes = vec![Plane { axis: 0, at: 0.0 }; shares.len().saturating_sub(1)];
     let mut parts: Vec<Part> = part(0, 0, shares.len(), shares).into_iter().collect();

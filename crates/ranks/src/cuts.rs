@@ -34,14 +34,12 @@ impl Region {
 
     /// Whether it contains a point. `point` has no NaN.
     #[inline]
-    #[must_use]
     pub fn holds(&self, point: [f32; 3]) -> bool {
         (0..3).all(|a| point[a] >= self.low[a] && (point[a] < self.high[a] || self.high[a] == f32::INFINITY))
     }
 
     /// Whether it contains all of a valid box.
     #[inline]
-    #[must_use]
     pub fn holds_all_of(&self, b: &Aabb) -> bool {
         self.holds(b.min) && self.holds(b.max)
     }
@@ -49,7 +47,6 @@ impl Region {
     /// Whether it reports the pair of two overlapping boxes: it contains the lower corner of their intersection.
     /// Exactly one region does, and both boxes overlap it.
     #[inline]
-    #[must_use]
     pub fn finds(&self, a: &Aabb, b: &Aabb) -> bool {
         self.holds([0, 1, 2].map(|k| a.min[k].max(b.min[k])))
     }
@@ -57,7 +54,6 @@ impl Region {
 
 impl Cuts {
     /// All of space for one rank.
-    #[must_use]
     pub fn one() -> Self {
         Self { planes: Vec::new(), regions: vec![Region::ALL] }
     }
@@ -84,14 +80,12 @@ impl Cuts {
     }
 
     /// The regions, in the order of the ranks.
-    #[must_use]
     pub fn regions(&self) -> &[Region] {
         &self.regions
     }
 
     /// The rank whose region contains a point.
     #[inline]
-    #[must_use]
     pub fn rank_of(&self, point: [f32; 3]) -> usize {
         let (mut plane, mut first, mut end) = (0, 0, self.regions.len());
         while end - first > 1 {
@@ -147,7 +141,6 @@ pub(crate) fn middle(first: usize, end: usize) -> usize {
 
 /// The centre of a box, clamped to finite numbers: the point by which the cuts count it.
 #[inline]
-#[must_use]
 pub fn centre(b: &Aabb) -> [f32; 3] {
     let bound = |v: f32| v.clamp(f32::MIN, f32::MAX) / 2.0;
     // Adding 0 turns -0 into 0.

@@ -122,25 +122,21 @@ impl<E: Exchange> Distributed<E> {
     }
 
     /// The regions of the ranks. One region of all space before the first frame.
-    #[must_use]
     pub fn cuts(&self) -> &Cuts {
         &self.cuts
     }
 
     /// Counts of the last frame.
-    #[must_use]
     pub fn last_frame(&self) -> &FrameReport {
         &self.report
     }
 
     /// The time of the slowest rank over that of equally busy ranks, minus one; `None` while times are unknown.
-    #[must_use]
     pub fn imbalance(&self) -> Option<f64> {
         self.balance.imbalance()
     }
 
     /// The broad phase of this rank's region.
-    #[must_use]
     pub fn adaptive(&self) -> &Adaptive {
         self.search.adaptive()
     }
@@ -151,7 +147,6 @@ impl<E: Exchange> Distributed<E> {
     }
 
     /// The full error of this rank's last search, if it failed.
-    #[must_use]
     pub fn search_error(&self) -> Option<&sapwise::Error> {
         self.search.error.as_ref()
     }

@@ -20,14 +20,12 @@ pub struct RankPairs {
 
 impl RankPairs {
     /// An empty list, in any order, not mirrored, without a limit.
-    #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
     /// An empty list with an order. [`PairOrder::Canonical`] is ascending by own id, then by the other id: the same
     /// list for any cuts, as long as each rank owns the same boxes.
-    #[must_use]
     pub fn with_order(order: PairOrder) -> Self {
         Self { order, ..Self::default() }
     }
@@ -39,7 +37,6 @@ impl RankPairs {
     }
 
     /// Whether this rank gets every pair of its boxes.
-    #[must_use]
     pub fn is_mirrored(&self) -> bool {
         self.mirrored
     }
@@ -51,31 +48,26 @@ impl RankPairs {
     }
 
     /// The limit set by [`set_limit`](Self::set_limit).
-    #[must_use]
     pub fn limit(&self) -> Option<usize> {
         self.limit
     }
 
     /// The order of the pairs.
-    #[must_use]
     pub fn order(&self) -> PairOrder {
         self.order
     }
 
     /// The pairs of the last frame.
-    #[must_use]
     pub fn as_slice(&self) -> &[(u64, u64)] {
         &self.pairs
     }
 
     /// The number of pairs of the last frame.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.pairs.len()
     }
 
     /// Whether the last frame has no pair.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.pairs.is_empty()
     }

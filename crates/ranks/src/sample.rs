@@ -24,14 +24,12 @@ impl Sample {
     pub const MOST: usize = 16_384;
 
     /// Takes up to `most` valid boxes of the usual cost: one from each of `most` equal parts of the list.
-    #[must_use]
     pub fn of(boxes: &[Aabb], most: usize) -> Vec<Self> {
         Self::with_pairs(boxes, most, |_| 0, 0.0)
     }
 
     /// The same with boxes that cost `pair_cost` more for each pair. `pairs_of` returns the number of pairs of the
     /// box at a position; each pair counts half for each of its boxes.
-    #[must_use]
     pub fn with_pairs(boxes: &[Aabb], most: usize, pairs_of: impl Fn(usize) -> u32, pair_cost: f64) -> Vec<Self> {
         let count = boxes.len().min(most);
         let start = |k: usize| (k as u128 * boxes.len() as u128 / count as u128) as usize;
@@ -48,7 +46,6 @@ impl Sample {
     }
 
     /// Returns the weight of the samples in each region.
-    #[must_use]
     pub fn weights(samples: &[Self], cuts: &Cuts) -> Vec<u64> {
         let mut weights = vec![0; cuts.regions().len()];
         samples.iter().for_each(|s| weights[cuts.rank_of(centre(&s.bounds))] += s.weight);

@@ -9,7 +9,6 @@ pub const FACTORS: [f64; 9] = [0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.
 /// Predicts the nanoseconds of the cheapest algorithm of a tuning for a load.
 ///
 /// Without costs in the tuning each box and each pair counts one nanosecond, so that only ratios have a meaning.
-#[must_use]
 pub fn predicted_ns(tuning: &Tuning, load: &Load) -> f64 {
     let counted = || f64::from(load.objects) + load.pairs;
     tuning.cheapest(load, |_| true).map_or_else(counted, |(_, ns)| ns).max(1.0)
@@ -21,7 +20,6 @@ pub fn predicted_ns(tuning: &Tuning, load: &Load) -> f64 {
 /// rank with a time that is not a number above 0 counts as one of mean speed.
 ///
 /// It uses only sums, products and comparisons, so that all ranks compute the same bits on any processor.
-#[must_use]
 pub fn shares(times: &[[f64; FACTORS.len()]]) -> Vec<f64> {
     let sound = |t: &&[f64; FACTORS.len()]| t.iter().all(|v| v.is_finite() && *v > 0.0);
     let known: Vec<_> = times.iter().filter(sound).collect();
@@ -50,7 +48,6 @@ pub fn shares(times: &[[f64; FACTORS.len()]]) -> Vec<f64> {
 /// Returns the cost of one more pair over that of one more box at a load; 0 if more boxes take no more time.
 ///
 /// `predict` returns the time of a load.
-#[must_use]
 pub fn pair_cost(load: &Load, predict: impl Fn(&Load) -> f64) -> f64 {
     // A large step, because the curve jumps where another algorithm becomes the cheapest.
     const MORE: f64 = 1.25;
@@ -65,7 +62,6 @@ pub fn pair_cost(load: &Load, predict: impl Fn(&Load) -> f64) -> f64 {
 /// Returns the cost of a box of each region over the mean box. `works` is the work of each region over that of a mean
 /// region, `owned` the weight of its samples in any unit. Boxes weigh more in a region with many pairs or with many
 /// boxes of others.
-#[must_use]
 pub fn costs(works: &[f64], owned: &[u64]) -> Vec<f64> {
     let mean = owned.iter().sum::<u64>() as f64 / owned.len().max(1) as f64;
     let cost = |(work, &owned): (&f64, &u64)| {
