@@ -28,7 +28,6 @@ pub struct Kind {
 
 impl Kind {
     /// The kind of a report.
-    #[must_use]
     pub fn of(report: &Report) -> Self {
         let (hardware, provenance) = (&report.hardware, &report.provenance);
         let cores = provenance.threads.or_else(|| hardware.value(ParameterId::UsableCores).map(|cores| cores as u32));
@@ -45,7 +44,6 @@ impl Kind {
 
 /// Returns why a report can't stand for the machines of its kind: it is published, was cut short, has
 /// gaps or was disturbed.
-#[must_use]
 pub fn unusable(report: &Report) -> Option<&'static str> {
     if report.label == Label::Published {
         Some("it holds published parameters")
@@ -78,7 +76,6 @@ pub struct Agreement {
 
 impl Times {
     /// The times of a report.
-    #[must_use]
     pub fn of(report: &Report) -> Self {
         let mut samples: BTreeMap<(String, u32, AlgorithmId), Vec<f64>> = BTreeMap::new();
         for point in &report.points {
@@ -91,7 +88,6 @@ impl Times {
     }
 
     /// Compares these times with those of other reports; `None` where none of them timed the same.
-    #[must_use]
     pub fn over(&self, others: &[&Self]) -> Option<Agreement> {
         let ratio = |(key, ns): (&(String, u32, AlgorithmId), &f64)| {
             let theirs: Vec<f64> = others.iter().filter_map(|other| other.0.get(key).copied()).collect();

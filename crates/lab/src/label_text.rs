@@ -3,7 +3,6 @@
 use crate::report::Label;
 
 /// The label as it stands in the file.
-#[must_use]
 pub fn kind(label: Label) -> &'static str {
     match label {
         Label::RealFull => "real_full",
@@ -16,7 +15,6 @@ pub fn kind(label: Label) -> &'static str {
 }
 
 /// What the label means.
-#[must_use]
 pub fn meaning(label: Label) -> &'static str {
     match label {
         Label::RealFull => "a whole machine, undisturbed",

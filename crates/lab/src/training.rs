@@ -149,7 +149,6 @@ pub struct MethodScore {
 
 impl MethodScore {
     /// Returns the least and the largest mean regret of what was held out.
-    #[must_use]
     pub fn regret_range(&self) -> Option<[f64; 2]> {
         Some([self.least_regret?, self.largest_regret?])
     }

@@ -36,7 +36,6 @@ pub fn write_text(path: &Path, text: &str) -> Result<()> {
 const TEMPORARY: [&str; 2] = [".sapwise-", ".tmp"];
 
 /// Whether a file is called as those are that [`write_atomically`] makes until they are whole.
-#[must_use]
 pub(crate) fn is_temporary(name: &OsStr) -> bool {
     name.to_str().is_some_and(|name| name.starts_with(TEMPORARY[0]) && name.ends_with(TEMPORARY[1]))
 }

@@ -42,7 +42,6 @@ fn first_real_gpu(hardware: &Hardware) -> Option<&GpuHardware> {
 
 /// Returns a parameter by its name in the ranges of a model. A parameter of GPUs is that of the first real one, which
 /// is a discrete GPU if the machine has any.
-#[must_use]
 pub fn figure(hardware: &Hardware, name: &str) -> Option<f64> {
     match name.strip_prefix(GPU_PREFIX) {
         Some(name) => first_real_gpu(hardware)?.value_named(name),

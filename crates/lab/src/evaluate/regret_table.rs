@@ -75,7 +75,6 @@ impl Regret {
     }
 
     /// Returns the least and the largest regret of a cell.
-    #[must_use]
     pub fn range(&self) -> Option<[f64; 2]> {
         range(&self.cells)
     }
@@ -83,13 +82,11 @@ impl Regret {
 
 impl RegretTable {
     /// Makes the table of a report by the medians over frames.
-    #[must_use]
     pub fn new(profile: &Profile) -> Self {
         Self::by(profile, |spot| spot.medians.clone())
     }
 
     /// Makes the table of a report by the means over frames, for which a user waits. One interrupted frame moves them.
-    #[must_use]
     pub fn by_means(profile: &Profile) -> Self {
         Self::by(profile, |spot| spot.medians.iter().zip(&spot.means).map(|(m, mean)| (m.0, *mean)).collect())
     }

@@ -185,7 +185,6 @@ pub struct Timing {
 
 impl Timed {
     /// Makes an entry with the usual terms of the method.
-    #[must_use]
     pub fn new(id: AlgorithmId, revision: u32) -> Self {
         Self { id, revision, terms: Vec::new() }
     }
@@ -193,7 +192,6 @@ impl Timed {
 
 impl Report {
     /// Returns whether the measurement was cut short, as the remarks say.
-    #[must_use]
     pub fn is_unfinished(&self) -> bool {
         self.remarks.iter().any(|remark| Self::is_cut_short(remark))
     }
@@ -204,20 +202,17 @@ impl Report {
     pub const INCOMPLETE: &str = " is incomplete: its process ";
 
     /// Returns whether the measurement has gaps or wrong answers, as the remarks say.
-    #[must_use]
     pub fn has_gaps(&self) -> bool {
         let gap = |remark: &String| remark.starts_with(Self::WRONG_ANSWER) || remark.contains(Self::INCOMPLETE);
         self.is_unfinished() || self.remarks.iter().any(gap)
     }
 
     /// Returns whether a remark says that the measurement was cut short.
-    #[must_use]
     pub fn is_cut_short(remark: &str) -> bool {
         remark.starts_with("unfinished") || remark.starts_with("interrupted")
     }
 
     /// Returns what makes this report unusable, if anything.
-    #[must_use]
     pub fn defect(&self) -> Option<String> {
         if let Some(defect) = self.hardware.defect() {
             return Some(defect.to_string());

@@ -14,7 +14,6 @@ pub use plan::{Ascent, Plan, share};
 pub const WARM_UP: usize = 24;
 
 /// Returns the median of samples in nanoseconds; `None` without samples.
-#[must_use]
 pub fn median(samples: &[u64]) -> Option<f64> {
     let samples: Vec<f64> = samples.iter().map(|&ns| ns as f64).collect();
     sapwise_tune::stats::median(&samples)
