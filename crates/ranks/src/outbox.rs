@@ -59,18 +59,6 @@ impl<const N: usize> Outbox<N> {
     }
 }
 
-/// The begin of each of some consecutive parts, then the end of the last.
-pub(crate) fn starts(counts: &[usize]) -> Vec<usize> {
-    let mut starts = Vec::with_capacity(counts.len() + 1);
-    let mut at = 0;
-    starts.push(at);
-    for count in counts {
-        at += count;
-        starts.push(at);
-    }
-    starts
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -87,6 +75,5 @@ mod tests {
             let packed = [2, 4, 1, 3].map(|w| [w, w + 10 * round]).concat();
             assert_eq!(outbox.pack(), packed);
         }
-        assert_eq!(starts(outbox.counts()), [0, 2, 2, 4]);
     }
 }

@@ -1,38 +1,18 @@
 //! Ranks that are threads of one process.
 
 use crate::exchange::Exchange;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
 
-/// A rank panics when it has waited this long for the others: one of them has ended.
+/// A rank panics when it has waited this long for another one.
 const WAIT_LIMIT: Duration = Duration::from_secs(120);
 
 /// One of several ranks that are threads of this process, for tests and to try the protocol without MPI.
 pub struct Threads {
     rank: usize,
-    shared: Arc<Shared>,
-}
-
-/// What the ranks share.
-struct Shared {
-    size: usize,
-    /// The words of each rank, with the begin of the part for each other rank.
-    offers: Vec<Mutex<(Vec<u64>, Vec<usize>)>>,
-    gate: Mutex<Gate>,
-    changed: Condvar,
-}
-
-/// Where ranks wait for each other.
-#[derive(Default)]
-struct Gate {
-    arrived: usize,
-    rounds: u64,
-    broken: bool,
-}
-
-/// Ignores poisoning: the panic itself ends the run.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Channels to and from each rank, this one too. A closed one shows that the rank has ended.
+    to: Vec<Sender<Vec<u64>>>,
+    from: Vec<Receiver<Vec<u64>>>,
 }
 
 impl Threads {
@@ -42,53 +22,21 @@ impl Threads {
     /// When `work` does, and for 0 ranks.
     pub fn run<T: Send>(ranks: usize, work: impl Fn(Self) -> T + Sync) -> Vec<T> {
         assert!(ranks > 0, "there is no rank to run on");
-        let shared = Arc::new(Shared {
-            size: ranks,
-            offers: (0..ranks).map(|_| Mutex::default()).collect(),
-            gate: Mutex::default(),
-            changed: Condvar::new(),
-        });
+        let mut all: Vec<Self> = (0..ranks).map(|rank| Self { rank, to: Vec::new(), from: Vec::new() }).collect();
+        for from in 0..ranks {
+            for to in 0..ranks {
+                let (sender, receiver) = channel();
+                all[from].to.push(sender);
+                all[to].from.push(receiver);
+            }
+        }
+        let work = &work;
         std::thread::scope(|scope| {
-            let start = |rank| {
-                let (own, work) = (Self { rank, shared: Arc::clone(&shared) }, &work);
-                scope.spawn(move || work(own))
-            };
-            let threads: Vec<_> = (0..ranks).map(start).collect();
+            let threads: Vec<_> = all.into_iter().map(|own| scope.spawn(move || work(own))).collect();
             let join =
                 |t: std::thread::ScopedJoinHandle<'_, T>| t.join().unwrap_or_else(|p| std::panic::resume_unwind(p));
             threads.into_iter().map(join).collect()
         })
-    }
-
-    /// Returns once every rank has called it.
-    fn meet(&self) {
-        let shared = &*self.shared;
-        let mut gate = lock(&shared.gate);
-        gate.arrived += 1;
-        if gate.arrived == shared.size {
-            gate.arrived = 0;
-            gate.rounds += 1;
-            shared.changed.notify_all();
-            return;
-        }
-        let round = gate.rounds;
-        while gate.rounds == round && !gate.broken {
-            let (next, waited) = shared.changed.wait_timeout(gate, WAIT_LIMIT).unwrap_or_else(PoisonError::into_inner);
-            gate = next;
-            gate.broken |= waited.timed_out() && gate.rounds == round;
-        }
-        let broken = gate.broken;
-        drop(gate);
-        assert!(!broken, "rank {}: another rank has ended or does not answer", self.rank);
-    }
-}
-
-impl Drop for Threads {
-    fn drop(&mut self) {
-        if std::thread::panicking() {
-            lock(&self.shared.gate).broken = true;
-            self.shared.changed.notify_all();
-        }
     }
 }
 
@@ -98,19 +46,18 @@ impl Exchange for Threads {
     }
 
     fn size(&self) -> usize {
-        self.shared.size
+        self.to.len()
     }
 
     fn sum(&mut self, values: &mut [u64]) {
-        values.clone_into(&mut lock(&self.shared.offers[self.rank]).0);
-        self.meet();
+        let send = values.repeat(self.size());
+        let mut received = vec![0; send.len()];
+        self.all_to_all(&send, &mut received);
+        let count = values.len();
         values.fill(0);
-        for offer in &self.shared.offers {
-            let offer = lock(offer);
-            assert_eq!(offer.0.len(), values.len(), "ranks come with different numbers of values");
-            values.iter_mut().zip(&offer.0).for_each(|(sum, v)| *sum = sum.wrapping_add(*v));
+        for (i, word) in received.into_iter().enumerate() {
+            values[i % count] = values[i % count].wrapping_add(word);
         }
-        self.meet();
     }
 
     fn all_to_all(&mut self, send: &[u64], receive: &mut [u64]) {
@@ -125,18 +72,20 @@ impl Exchange for Threads {
         receive: &mut [u64],
         receive_counts: &[usize],
     ) {
-        let offer = (send.to_vec(), crate::outbox::starts(send_counts));
-        *lock(&self.shared.offers[self.rank]) = offer;
-        self.meet();
         let mut at = 0;
-        for (offer, &count) in self.shared.offers.iter().zip(receive_counts) {
-            let offer = lock(offer);
-            let part = offer.1[self.rank]..offer.1[self.rank + 1];
-            assert_eq!(part.len(), count, "a rank sends another number of words than is awaited");
-            receive[at..at + count].copy_from_slice(&offer.0[part]);
+        for (to, &count) in self.to.iter().zip(send_counts) {
+            // Fails when that rank has ended; receiving from it then fails too.
+            let _ = to.send(send[at..at + count].to_vec());
             at += count;
         }
-        self.meet();
+        at = 0;
+        for (from, &count) in self.from.iter().zip(receive_counts) {
+            let part = from.recv_timeout(WAIT_LIMIT);
+            let part = part.unwrap_or_else(|_| panic!("rank {}: another rank has ended or does not answer", self.rank));
+            assert_eq!(part.len(), count, "a rank sends another number of words than is awaited");
+            receive[at..at + count].copy_from_slice(&part);
+            at += count;
+        }
     }
 }
 
