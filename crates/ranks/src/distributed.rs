@@ -20,13 +20,6 @@ const PAIR_WORDS: usize = 2;
 /// Words that announce pairs: their number and the outcome of the search.
 const ANSWER_WORDS: usize = 3;
 
-/// Bytes of a box that is sent.
-pub const BOX_BYTES: u64 = 8 * BOX_WORDS as u64;
-/// Bytes of a pair that is sent.
-pub const PAIR_BYTES: u64 = 8 * PAIR_WORDS as u64;
-/// Bytes of counts that each rank sends to each other one in a frame.
-pub const COUNT_BYTES: u64 = 8 * (record::WORDS + ANSWER_WORDS) as u64;
-
 /// Finds the pairs of boxes that are spread over ranks.
 ///
 /// [`find_pairs`](Self::find_pairs) is collective: every rank calls it equally often. The owner of a box may change

@@ -50,7 +50,7 @@ mod threads;
 
 pub use bisect::bisect;
 pub use cuts::{Cuts, Region, centre};
-pub use distributed::{BOX_BYTES, COUNT_BYTES, Distributed, FrameReport, PAIR_BYTES};
+pub use distributed::{Distributed, FrameReport};
 pub use error::{Error, Failure};
 pub use exchange::Exchange;
 pub use pairs::RankPairs;
