@@ -9,6 +9,7 @@ use sapwise::error::BoxDefect;
 use sapwise::{Aabb, Adaptive, BroadPhase, PairOrder, Pairs, Registry, Tuning};
 use sapwise_ranks::{Distributed, Error, Exchange, RankPairs};
 use sapwise_scenes::{Random, Scenario};
+use std::fmt::Debug;
 
 /// A broad phase with the usual tuning on one core.
 pub(crate) fn distributed<E: Exchange>(exchange: impl Into<E>) -> Distributed<E> {
@@ -87,6 +88,25 @@ pub(crate) fn list(mirrored: bool) -> RankPairs {
     pairs
 }
 
+/// Runs one frame, compares this rank's pairs with its part of `all` and returns their number.
+fn compare<E: Exchange>(
+    ranks: &mut Distributed<E>,
+    what: &dyn Debug,
+    (boxes, all): (&[Aabb], &[(u32, u32)]),
+    id: impl Fn(usize) -> u64,
+    owner: impl Fn(usize) -> usize,
+    pairs: &mut RankPairs,
+) -> u64 {
+    let rank = ranks.rank();
+    let own = (0..boxes.len()).filter(|&k| owner(k) == rank).map(|k| (boxes[k], id(k)));
+    let (own, ids): (Vec<Aabb>, Vec<u64>) = own.unzip();
+    ranks.find_pairs(&own, &ids, pairs).unwrap_or_else(|e| panic!("{what:?}: {e}"));
+    let wanted = expected(all, id, owner, rank, pairs.is_mirrored());
+    let (found, size) = (pairs.as_slice(), ranks.ranks());
+    assert!(found == wanted, "{what:?}: rank {rank} of {size}: {} pairs instead of {}", found.len(), wanted.len());
+    wanted.len() as u64
+}
+
 /// Runs one frame and compares it with the definition.
 pub(crate) fn frame<E: Exchange>(
     ranks: &mut Distributed<E>,
@@ -96,19 +116,7 @@ pub(crate) fn frame<E: Exchange>(
     owner: impl Fn(usize) -> usize,
     mirrored: bool,
 ) {
-    let own: Vec<usize> = (0..boxes.len()).filter(|&k| owner(k) == ranks.rank()).collect();
-    let (own_boxes, ids): (Vec<Aabb>, Vec<u64>) = own.iter().map(|&k| (boxes[k], id(k))).unzip();
-    let mut pairs = list(mirrored);
-    ranks.find_pairs(&own_boxes, &ids, &mut pairs).unwrap_or_else(|e| panic!("{what}: {e}"));
-    let wanted = expected(&naive(boxes), id, owner, ranks.rank(), mirrored);
-    let (found, all) = (pairs.as_slice(), ranks.ranks());
-    assert!(
-        found == wanted,
-        "{what}: rank {} of {all} found {} pairs instead of {}",
-        ranks.rank(),
-        found.len(),
-        wanted.len()
-    );
+    compare(ranks, &what, (boxes, &naive(boxes)), id, owner, &mut list(mirrored));
 }
 
 /// Plays a scenario and compares every frame with one process and every tenth with the definition. Returns this
@@ -124,15 +132,11 @@ pub(crate) fn play<E: Exchange>(
     let mut alone = Adaptive::new(Tuning::usual(&registry), &registry).unwrap();
     let (mut all, mut count) = (Pairs::new(), 0);
     let mut scene = scenario.start(objects, 1);
-    let (rank, size) = (ranks.rank(), ranks.ranks());
+    let size = ranks.ranks();
     let mut lists = [list(false), list(true)];
     for frame in 0..frames {
         let boxes = scene.boxes();
         let owner = |k: usize| owners.of(k, frame, size, boxes.len());
-        let (own, ids): (Vec<Aabb>, Vec<u64>) =
-            (0..boxes.len()).filter(|&k| owner(k) == rank).map(|k| (boxes[k], id(k))).unzip();
-        let pairs = &mut lists[usize::from(frame % 3 == 0)];
-        ranks.find_pairs(&own, &ids, pairs).unwrap_or_else(|e| panic!("{scenario}, frame {frame}: {e}"));
         alone.find_pairs(boxes, &mut all).unwrap();
         if frame % 10 == 0 {
             let mut one: Vec<(u32, u32)> = all.as_slice().to_vec();
@@ -141,10 +145,8 @@ pub(crate) fn play<E: Exchange>(
             definition.sort_unstable();
             assert!(one == definition, "{scenario}, frame {frame}: one process is wrong");
         }
-        let wanted = expected(all.as_slice(), id, owner, rank, pairs.is_mirrored());
-        let (found, how) = (pairs.as_slice(), (scenario, owners, frame, rank, size));
-        assert!(found == wanted, "{how:?}: {} pairs instead of {}", found.len(), wanted.len());
-        count += wanted.len() as u64;
+        let pairs = &mut lists[usize::from(frame % 3 == 0)];
+        count += compare(ranks, &(scenario, owners, frame), (boxes, all.as_slice()), id, owner, pairs);
         scene.advance();
     }
     count
