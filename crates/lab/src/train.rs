@@ -68,9 +68,8 @@ mod tests {
     use crate::data::COMPARED;
     use crate::progress::Silent;
     use crate::report::Report;
-    use crate::synthetic::{Machine, truth};
+    use crate::synthetic::Machine;
     use crate::training::{read_model, write_model};
-    use sapwise::algorithm::Entry;
     use sapwise_tune::hardware::ParameterId;
 
     fn reports() -> Vec<(String, Report)> {
@@ -86,31 +85,6 @@ mod tests {
         assert_eq!(trained.model.ranges.len(), COMPARED.len());
         let cores = trained.model.ranges.iter().find(|r| r.parameter == ParameterId::UsableCores).unwrap();
         assert_eq!((cores.min, cores.max), (2.0, 16.0));
-    }
-
-    #[test]
-    fn a_model_of_gpus_knows_their_ranges_and_predicts_them() {
-        let machines = Machine::family_with_gpus();
-        let reports: Vec<(String, Report)> =
-            machines[..3].iter().map(|m| (format!("{}.json", m.name), m.report())).collect();
-        let model = train(Selection::of(&reports), "test", &Silent).unwrap().model;
-        let range = model.ranges.iter().find(|r| r.parameter == "gpu/upload_rate_gb_per_s").unwrap();
-        assert_eq!((range.min, range.max), (5.0, 24.0));
-        let all = |ids: &[&str]| ids.iter().map(|id| Entry::new(id.parse().unwrap(), 1)).collect::<Vec<_>>();
-        let within = model
-            .predict(&machines[1].hardware(), &all(&["grid-sap@cpu1", "grid-sap@gpu0", "grid-sap@gpu0+1"]))
-            .unwrap();
-        assert!(within.costs.len() == 3 && !within.extrapolated, "{:?}", within.warnings);
-        let outside = model.predict(&machines[4].hardware(), &all(&["grid-sap@gpu0"])).unwrap();
-        let told = |text: &str| outside.warnings.iter().any(|w| w.contains(text));
-        assert!(outside.extrapolated && told("upload_rate_gb_per_s of gpu0 is 50.0 GB/s"), "{:?}", outside.warnings);
-    }
-
-    #[test]
-    fn one_report_makes_a_model_without_scores() {
-        let trained = train(Selection::of(&reports()[..1]), "test", &Silent).unwrap();
-        assert_eq!(trained.model.methods.len(), truth().len());
-        assert!(trained.training.validation.methods.is_empty());
     }
 
     #[test]

@@ -6,9 +6,9 @@ use sapwise_lab::data::{host, read_reports};
 use sapwise_lab::progress::Silent;
 use sapwise_lab::report::{self, Label, Report};
 use sapwise_lab::{Training, read_model};
+use sapwise_tune::Model;
 use sapwise_tune::hardware::{GpuParameterId, ParameterId};
 use sapwise_tune::model::MethodModel;
-use sapwise_tune::{Hardware, Model};
 use std::path::{Path, PathBuf};
 
 fn repository(path: &str) -> PathBuf {
@@ -88,34 +88,4 @@ fn the_built_in_model_predicts_for_every_report() {
         // More cores than it has seen lie outside of its ranges.
         assert!(known || cores <= most_known || prediction.extrapolated, "{path}");
     }
-}
-
-#[test]
-fn a_machine_outside_the_training_is_told_and_a_missing_parameter_leaves_out_what_needs_it() {
-    let model = Model::built_in().unwrap();
-    let known = training().trained_on.iter().find(|t| t.label == Label::RealFull).unwrap().file.clone();
-    let (_, report) = reports().into_iter().find(|(path, _)| *path == known).unwrap();
-    let mut hardware = report.hardware;
-    let algorithms = algorithms(2);
-    let set = |hardware: &mut Hardware, id: ParameterId, value: Option<f64>| {
-        hardware.parameters.iter_mut().find(|p| p.name == id.as_str()).unwrap().value = value;
-    };
-    let without = |id: ParameterId| {
-        let mut hardware = hardware.clone();
-        set(&mut hardware, id, None);
-        let prediction = model.predict(&hardware, &algorithms).ok()?;
-        (prediction.costs.len() < algorithms.len()).then_some((id, prediction))
-    };
-    let (id, prediction) =
-        ParameterId::ALL.into_iter().find_map(without).expect("some methods need what others do not");
-    assert!(!prediction.costs.is_empty());
-    assert!(prediction.warnings.iter().any(|w| w.contains(id.as_str())), "{id}: {:?}", prediction.warnings);
-    set(&mut hardware, ParameterId::ClockMeasuredGhz, Some(9.0));
-    assert!(model.predict(&hardware, &algorithms).unwrap().extrapolated);
-    let other_revision: Vec<_> = algorithms.iter().map(|e| Entry::new(e.id.clone(), e.revision + 1)).collect();
-    let error = model.predict(&hardware, &other_revision).unwrap_err().to_string();
-    assert!(error.contains("train on new reports"), "{error}");
-    set(&mut hardware, ParameterId::ClockMeasuredGhz, Some(4500.0));
-    let error = model.predict(&hardware, &algorithms).unwrap_err().to_string();
-    assert!(error.contains("clock_measured_ghz is 4500"), "{error}");
 }

@@ -12,8 +12,8 @@ use sapwise_tune::hardware::GpuParameterId;
 use sapwise_tune::measure::{self, Options};
 use sapwise_tune::{GpuKind, Parameter};
 
-fn options(brief: bool) -> Options {
-    Options::default().brief(brief)
+fn options() -> Options {
+    Options::default().brief(true)
 }
 
 fn check(p: &Parameter) {
@@ -21,27 +21,15 @@ fn check(p: &Parameter) {
     assert!(p.source != "not measured", "{p:?}");
 }
 
-fn show(parameters: &[Parameter]) {
-    for p in parameters {
-        let (value, spread) = (p.value.unwrap_or(f64::NAN), p.dispersion.unwrap_or(f64::NAN));
-        let (name, foreign) = (&p.name, p.foreign_load.unwrap_or(0.0));
-        println!(
-            "{name:32} {value:>16.3}  ±{spread:.3}  n={:<4} foreign {foreign:.2}  {:?}: {}",
-            p.samples, p.how, p.source
-        );
-    }
-}
-
 #[test]
 fn every_parameter_once_and_in_order() {
     let Some(gpus) = gpus() else { return };
     for index in 0..gpus.len() as u32 {
-        let hardware = measure::gpu(&gpus, index, &options(true)).unwrap();
+        let hardware = measure::gpu(&gpus, index, &options()).unwrap();
         assert_eq!(Some(&hardware.gpu), gpus.identities().nth(index as usize));
         let names: Vec<String> = hardware.parameters.iter().map(|p| p.name.clone()).collect();
         assert_eq!(names, GpuParameterId::OF_ONE);
         hardware.parameters.iter().for_each(check);
-        show(&hardware.parameters);
         // Every driver allows these.
         for name in [GpuParameterId::UploadGbPerS, GpuParameterId::RoundTripNs, GpuParameterId::ArithmeticGflopPerS] {
             assert!(hardware.value(name).is_some_and(|value| value > 0.0), "{name}");
@@ -59,13 +47,13 @@ fn every_parameter_once_and_in_order() {
 #[test]
 fn groups_of_gpus() {
     let Some(gpus) = gpus() else { return };
-    assert!(measure::gpu_group(&gpus, &[0], &options(true)).is_err());
-    assert!(measure::gpu_group(&gpus, &[0, 0], &options(true)).is_err());
+    assert!(measure::gpu_group(&gpus, &[0], &options()).is_err());
+    assert!(measure::gpu_group(&gpus, &[0, 0], &options()).is_err());
     if gpus.len() < 2 {
         println!("skipped: there is one GPU");
         return;
     }
-    let group = measure::gpu_group(&gpus, &[1, 0, 1], &options(true)).unwrap();
+    let group = measure::gpu_group(&gpus, &[1, 0, 1], &options()).unwrap();
     assert_eq!(group.gpus, [0, 1]);
     assert_eq!(group.parameters.iter().map(|p| p.name.as_str()).collect::<Vec<_>>(), GpuParameterId::GROUP);
     group.parameters.iter().for_each(check);
@@ -74,30 +62,8 @@ fn groups_of_gpus() {
 
 #[test]
 fn a_gpu_that_is_not_there() {
-    assert!(measure::gpu(&Gpus::none(), 0, &options(true)).is_err());
-    assert!(measure::gpu_group(&Gpus::none(), &[0, 1], &options(true)).is_err());
-}
-
-/// Prints the values of this machine:
-/// `cargo test -p sapwise-tune --features gpu --test measure_gpu -- --ignored --nocapture`.
-#[test]
-#[ignore = "takes seconds for each GPU"]
-fn the_whole_measurement() {
-    let Some(gpus) = gpus() else { return };
-    for index in 0..gpus.len() as u32 {
-        let start = std::time::Instant::now();
-        let hardware = measure::gpu(&gpus, index, &options(false)).unwrap();
-        println!("\n{:?}, {:.2} s", hardware.gpu, start.elapsed().as_secs_f64());
-        show(&hardware.parameters);
-        hardware.parameters.iter().for_each(check);
-    }
-    if gpus.len() > 1 {
-        let all: Vec<u32> = (0..gpus.len() as u32).collect();
-        let start = std::time::Instant::now();
-        let group = measure::gpu_group(&gpus, &all, &options(false)).unwrap();
-        println!("\n{all:?}, {:.2} s", start.elapsed().as_secs_f64());
-        show(&group.parameters);
-    }
+    assert!(measure::gpu(&Gpus::none(), 0, &options()).is_err());
+    assert!(measure::gpu_group(&Gpus::none(), &[0, 1], &options()).is_err());
 }
 
 /// Measuring the program's own device, within a limit, gets all that predictions read.

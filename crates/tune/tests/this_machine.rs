@@ -365,8 +365,9 @@ fn a_process_of_the_user() {
 #[test]
 fn the_default_cache_is_the_users_folder() {
     let folder = tempfile::tempdir().unwrap();
-    process("a_process_of_the_user", "XDG_CACHE_HOME", folder.path());
-    assert_eq!(count(&folder.path().join("sapwise")), 1);
+    let missing = folder.path().join("missing");
+    process("a_process_of_the_user", "XDG_CACHE_HOME", &missing);
+    assert_eq!(count(&missing.join("sapwise")), 1);
     // A home that is no folder.
     process("a_process_of_the_user", "HOME", Path::new("/dev/null"));
 }

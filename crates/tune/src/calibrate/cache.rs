@@ -94,7 +94,6 @@ mod tests {
     use sapwise::AlgorithmId;
     use sapwise::tuning::Step;
     use std::collections::BTreeSet;
-    use std::time::Duration;
 
     /// A tuning that names its writer.
     fn tuning(writer: u32) -> Tuning {
@@ -109,19 +108,6 @@ mod tests {
 
     fn names(folder: &Path) -> Vec<String> {
         fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect()
-    }
-
-    #[test]
-    fn a_file_reads_back_with_its_time() {
-        let folder = tempfile::tempdir().unwrap();
-        let file = file(&folder.path().join("missing").join("folder"));
-        assert_eq!(file.read(), Ok(None));
-        let measured = SystemTime::UNIX_EPOCH + Duration::from_secs(1_700_000_000);
-        for writer in [1, 2] {
-            file.write(&tuning(writer), measured).unwrap();
-            assert_eq!(file.read(), Ok(Some((tuning(writer), measured))));
-        }
-        assert_eq!(names(file.path().parent().unwrap()).len(), 1);
     }
 
     #[test]

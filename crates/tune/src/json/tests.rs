@@ -1,5 +1,4 @@
 use super::*;
-use crate::{Hardware, Machine, Parameter, ParameterId};
 use sapwise::tuning::{Product, Source, Step, Term};
 use serde_json::{Value, json};
 
@@ -70,15 +69,6 @@ fn a_model_is_read_without_the_notes_of_its_training() {
     assert!(read.skipped.is_empty());
     // What the build shortened.
     assert_eq!(read.value, built_in);
-}
-
-#[test]
-fn unknown_parameters_are_kept() {
-    let of_tomorrow = Parameter::measured("photons_per_s", 1e9, "a machine of tomorrow");
-    let known = Parameter::reported(ParameterId::UsableCores, 2.0, "test");
-    let hardware = Hardware::new(Machine::of("0123456789abcdef"), vec![known, of_tomorrow]);
-    let read: Hardware = serde_json::from_str(&serde_json::to_string(&hardware).unwrap()).unwrap();
-    assert_eq!(read, hardware);
 }
 
 #[test]

@@ -185,6 +185,13 @@ fn helpers_read_the_scaling_between_two_and_all_threads() {
 }
 
 #[test]
+fn another_revision_waits_for_new_reports() {
+    let other = [Entry::new("brute@cpu1".parse().unwrap(), 2)];
+    let error = model(vec![method(BackendClass::Cpu, Scale::Cycle)]).predict(&hardware(), &other).unwrap_err();
+    assert!(error.to_string().contains("train on new reports"), "{error}");
+}
+
+#[test]
 fn a_method_falls_back_to_one_that_the_model_holds() {
     let mut both = vec![method(BackendClass::Cpu, Scale::Cycle), method(BackendClass::Cpu, Scale::Cycle)];
     both[1].method = "other".to_owned();
@@ -207,19 +214,4 @@ fn the_table_marks_what_a_model_reads() {
     let read = scales.chain(HelpersModel::PARAMETERS).copied().chain([ParameterId::CacheLlcBytes]);
     let marked = ParameterId::ALL.into_iter().filter(|id| id.quantity().read_by_model);
     assert_eq!(read.collect::<BTreeSet<_>>(), marked.collect());
-}
-
-#[test]
-fn the_built_in_model_predicts_from_the_parameters_that_it_names() {
-    let model = Model::built_in().unwrap();
-    let ids = model.parameters();
-    let figure = |&id: &ParameterId| match id {
-        ParameterId::CacheLlcBytes => Parameter::reported(id, 33_554_432.0, "test"),
-        ParameterId::ForkJoinColdNs => Parameter::reported(id, 5000.0, "test"),
-        _ => Parameter::reported(id, 4.0, "test"),
-    };
-    let all = Hardware { parameters: ids.iter().map(figure).collect(), gpus: Vec::new(), ..hardware() };
-    let algorithms = sapwise::Registry::with_cores(4).entries().to_vec();
-    let prediction = model.predict(&all, &algorithms).unwrap();
-    assert_eq!(prediction.costs.len(), algorithms.len(), "{:?}", prediction.warnings);
 }
