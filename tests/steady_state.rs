@@ -2,52 +2,16 @@
 //!
 //! One test only, because the counter sees every thread of the process.
 
-use sapwise::algorithm::Load;
-use sapwise::tuning::{AlgorithmCost, CostCurve, CostTerm, Source, Term};
-use sapwise::{
-    Aabb, Adaptive, AlgorithmId, BroadPhase, Changes, Error, Filter, Membership, PairOrder, Pairs, Registry, Tuning,
-};
+mod common;
+#[path = "common/counting.rs"]
+mod counting;
+
+use common::tuning;
+use counting::{ALLOCATIONS, LARGE};
+use sapwise::{Aabb, Adaptive, BroadPhase, Changes, Error, Filter, Membership, PairOrder, Pairs, Registry};
 use sapwise_scenes::Scenario;
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
-
-/// The system's allocator, counting calls.
-struct Counting;
-
-static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
-static LARGE: AtomicUsize = AtomicUsize::new(0);
-
-/// Smallest allocation that is no job of rayon and no block of its queue.
-const LARGE_BYTES: usize = 4096;
-
-fn count(size: usize) {
-    ALLOCATIONS.fetch_add(1, Relaxed);
-    LARGE.fetch_add(usize::from(size >= LARGE_BYTES), Relaxed);
-}
-
-// SAFETY: every call is passed on unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count(layout.size());
-        // SAFETY: the caller's promise.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promise.
-        unsafe { System.dealloc(at, layout) }
-    }
-
-    unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        count(size);
-        // SAFETY: the caller's promise.
-        unsafe { System.realloc(at, layout, size) }
-    }
-}
-
-#[global_allocator]
-static COUNTING: Counting = Counting;
 
 /// Returns the number of allocations, and of large ones, of `run` in `frames` frames of a scene, after `rounds` of the
 /// same frames: `pair-cache` settles its margin in seven of them, and its memory depends on the margin.
@@ -94,20 +58,6 @@ fn allocations(
     (counted, large)
 }
 
-/// Returns a tuning whose crossovers `fragmentation` passes: 60 n = 5000 + 30 n at 167, 5000 + 30 n = 30 000 + 10 n at
-/// 1250.
-fn tuning(registry: &Registry) -> Tuning {
-    let cost = |id: &str, call: f64, object: f64| {
-        let revision = registry.entries().iter().find(|e| e.id.to_string() == id).unwrap().revision;
-        let terms = [(Term::Call, call), (Term::Objects, object)].map(|(term, unit_ns)| CostTerm { term, unit_ns });
-        AlgorithmCost::new(id.parse().unwrap(), revision, CostCurve::new(terms.to_vec()), 0.0)
-    };
-    let loads: Vec<Load> = (0..16).map(|k| Load::of_objects(1 << k)).collect();
-    let costs =
-        vec![cost("brute@cpu1", 0.0, 60.0), cost("sap@cpu1", 5_000.0, 30.0), cost("grid-sap@cpu1", 30_000.0, 10.0)];
-    Tuning::from_costs(Source::Measured, "uniform", costs, &loads)
-}
-
 #[test]
 fn steady_state_allocates_nothing() {
     const FRAMES: usize = 40;
@@ -140,7 +90,9 @@ fn steady_state_allocates_nothing() {
     }
     for extras in [false, true] {
         // With learning, times could switch to an algorithm that has not had so large a frame yet.
-        let mut adaptive = Adaptive::new(tuning(&registry), &registry).unwrap();
+        // `fragmentation` passes its crossovers: 60 n = 5000 + 30 n at 167, 5000 + 30 n = 30 000 + 10 n at 1250.
+        let costs = [("brute@cpu1", 0.0, 60.0), ("sap@cpu1", 5_000.0, 30.0), ("grid-sap@cpu1", 30_000.0, 10.0)];
+        let mut adaptive = Adaptive::new(tuning(registry.entries(), 0.0, &costs), &registry).unwrap();
         adaptive.set_learning(false);
         // The clock decides when to switch: the first frame of an algorithm may be its largest.
         adaptive.prepare(3000);
@@ -171,14 +123,11 @@ fn idle_candidates() -> (Adaptive, Arc<AtomicUsize>) {
     }
     let mut registry = Registry::with_cores(1);
     let (shared, turns) = (Arc::new([const { AtomicUsize::new(0) }; 2]), Arc::new(AtomicUsize::new(0)));
-    let ids: Vec<AlgorithmId> = (0..4).map(|k| format!("idle-{k}@cpu1").parse().unwrap()).collect();
+    let ids = ["idle-0@cpu1", "idle-1@cpu1", "idle-2@cpu1", "idle-3@cpu1"];
     for (k, id) in ids.iter().enumerate() {
         let (shared, turns) = (Arc::clone(&shared), Arc::clone(&turns));
-        registry.add(id.clone(), 1, move || Ok(Box::new(Idle(k, Arc::clone(&shared), Arc::clone(&turns), 3))));
+        registry.add(id.parse().unwrap(), 1, move || Ok(Box::new(Idle(k, Arc::clone(&shared), Arc::clone(&turns), 3))));
     }
-    let curve = CostCurve::new(vec![CostTerm { term: Term::Call, unit_ns: 10_000.0 }]);
-    let costs = ids.into_iter().map(|algorithm| AlgorithmCost::new(algorithm, 1, curve.clone(), 0.1));
-    let loads = [Load::of_objects(10), Load::of_objects(1000)];
-    let tuning = Tuning::from_costs(Source::Predicted, "uniform", costs.collect(), &loads);
+    let tuning = tuning(registry.entries(), 0.1, &ids.map(|id| (id, 10_000.0, 0.0)));
     (Adaptive::new(tuning, &registry).unwrap(), turns)
 }

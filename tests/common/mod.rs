@@ -1,13 +1,28 @@
 //! Shared by the test programs of the contract.
 #![allow(dead_code, reason = "each test program uses a part of this")]
 
-use sapwise::algorithm::SimdLevel;
+use sapwise::algorithm::{Entry, Load, SimdLevel};
 use sapwise::error::BoxDefect;
 use sapwise::internals::Pair;
-use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Membership, Pairs, Registry};
+use sapwise::tuning::{AlgorithmCost, CostCurve, CostTerm, Source, Term};
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Membership, Pairs, Registry, Tuning};
 
 /// Algorithms with their names.
 pub(crate) type Algorithms = Vec<(String, Box<dyn BroadPhase>)>;
+
+/// Returns a tuning in which each algorithm costs these nanoseconds for a call and for an object, in the revisions of
+/// `entries`.
+pub(crate) fn tuning(entries: &[Entry], spread_ln: f64, costs: &[(&str, f64, f64)]) -> Tuning {
+    let cost = |&(id, call, object): &(&str, f64, f64)| {
+        let id: AlgorithmId = id.parse().unwrap();
+        let same = |e: &&Entry| e.id.method() == id.method() && e.id.backend().class() == id.backend().class();
+        let revision = entries.iter().find(same).map_or(1, |e| e.revision);
+        let curve = CostCurve::new(vec![CostTerm::new(Term::Call, call), CostTerm::new(Term::Objects, object)]);
+        AlgorithmCost::new(id, revision, curve, spread_ln)
+    };
+    let loads: Vec<Load> = (0..16).map(|k| Load::of_objects(1 << k)).collect();
+    Tuning::from_costs(Source::Measured, "uniform", costs.iter().map(cost).collect(), &loads)
+}
 
 /// The oracle: the definition of overlap, in a double loop.
 pub(crate) fn naive(boxes: &[Aabb]) -> Vec<Pair> {

@@ -13,18 +13,19 @@
 
 #[path = "../../../tests/common/mod.rs"]
 mod common;
+#[path = "../../../tests/common/counting.rs"]
+mod counting;
 #[path = "soak/kept.rs"]
 mod kept;
 
 use common::{Random, naive};
-use sapwise::algorithm::Load;
-use sapwise::tuning::{AlgorithmCost, CostCurve, CostTerm, Source, Term};
+use counting::LIVE;
+use sapwise::tuning::Source;
 use sapwise::{Adaptive, BroadPhase, Error, PairOrder, Pairs, Reason, Registry, Tuning};
 use sapwise_scenes::Scenario;
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicIsize, AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
 /// Default number of frames.
@@ -35,35 +36,6 @@ const LIFE: u64 = if cfg!(feature = "long-tests") { 1000 } else { 250 };
 
 /// Memory that may be in use at the end beyond that early on: rayon frees memory of ended threads late.
 const SLACK_BYTES: isize = 64 << 10;
-
-/// The system's allocator, counting the bytes that are in use.
-struct Counting;
-
-static LIVE: AtomicIsize = AtomicIsize::new(0);
-
-// SAFETY: every call is passed on unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        LIVE.fetch_add(layout.size() as isize, Relaxed);
-        // SAFETY: the caller's promise.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
-        LIVE.fetch_sub(layout.size() as isize, Relaxed);
-        // SAFETY: the caller's promise.
-        unsafe { System.dealloc(at, layout) }
-    }
-
-    unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        LIVE.fetch_add(size as isize - layout.size() as isize, Relaxed);
-        // SAFETY: the caller's promise.
-        unsafe { System.realloc(at, layout, size) }
-    }
-}
-
-#[global_allocator]
-static COUNTING: Counting = Counting;
 
 /// A slot for a GPU: even while it is empty, odd while there is one. The number differs for each device.
 #[derive(Default)]
@@ -117,25 +89,17 @@ fn registry(cores: u32, slot: &Arc<Slot>) -> Registry {
 
 /// Returns a tuning of brute force for few boxes, and the GPU for many, or several threads if it is lost.
 fn tuning() -> Tuning {
-    let registry = Registry::with_cores(1);
-    let cost = |id: &str, call: f64, object: f64| {
-        let of_method = registry.entries().iter().find(|e| id.starts_with(&format!("{}@cpu", e.id.method())));
-        let term = |term, unit_ns| CostTerm { term, unit_ns };
-        let curve = CostCurve::new(vec![term(Term::Call, call), term(Term::Objects, object)]);
-        AlgorithmCost::new(id.parse().unwrap(), of_method.map_or(1, |e| e.revision), curve, 0.3)
-    };
-    let costs = vec![
-        cost("brute@cpu1", 100.0, 60.0),
-        cost("pair-cache@cpu1", 1500.0, 40.0),
-        cost(GPU, 4000.0, 5.0),
-        cost("sap@cpu1", 2500.0, 45.0),
-        cost("grid-sap@cpu2", 4000.0, 25.0),
-        cost("brute@cpu2", 3000.0, 31.0),
-        cost("pair-cache@cpu3", 5000.0, 14.0),
-        cost("grid-sap@cpu4", 5500.0, 11.0),
+    let costs = [
+        ("brute@cpu1", 100.0, 60.0),
+        ("pair-cache@cpu1", 1500.0, 40.0),
+        (GPU, 4000.0, 5.0),
+        ("sap@cpu1", 2500.0, 45.0),
+        ("grid-sap@cpu2", 4000.0, 25.0),
+        ("brute@cpu2", 3000.0, 31.0),
+        ("pair-cache@cpu3", 5000.0, 14.0),
+        ("grid-sap@cpu4", 5500.0, 11.0),
     ];
-    let loads: Vec<Load> = (0..12).map(|k| Load::of_objects(1 << k)).collect();
-    Tuning::from_costs(Source::Default, "fragmentation", costs, &loads)
+    common::tuning(Registry::with_cores(1).entries(), 0.3, &costs)
 }
 
 /// Counts of events.
