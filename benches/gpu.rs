@@ -178,20 +178,8 @@ fn upload(gpu: &Gpu, boxes: &[Aabb], last: Option<wgpu::Buffer>) -> Result<wgpu:
 /// Downloads pairs.
 fn download(gpu: &Gpu, found: ResidentPairs<'_>) -> Result<Pairs, String> {
     let mut pairs = Pairs::new();
-    let size = u64::from(found.count) * 8;
-    if size > 0 {
-        let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
-        let descriptor = wgpu::BufferDescriptor { label: Some("pairs"), size, usage, mapped_at_creation: false };
-        let copy = gpu.try_make(|device| device.create_buffer(&descriptor)).map_err(|e| e.to_string())?;
-        let mut encoder = gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_buffer_to_buffer(found.buffer, 0, &copy, 0, size);
-        let submission = gpu.queue().submit([encoder.finish()]);
-        copy.map_async(wgpu::MapMode::Read, .., |_| {});
-        gpu.wait(submission).map_err(|e| e.to_string())?;
-        let bytes = copy.get_mapped_range(..).map_err(|e| e.to_string())?;
-        let number = |b: &[u8]| u32::from_ne_bytes([b[0], b[1], b[2], b[3]]);
-        bytes.chunks_exact(8).for_each(|pair| pairs.push(number(&pair[..4]), number(&pair[4..])));
-    }
+    let words = gpu.read_words(found.buffer, 2 * u64::from(found.count)).map_err(|e| e.to_string())?;
+    words.chunks_exact(2).for_each(|pair| pairs.push(pair[0], pair[1]));
     pairs.finish().map_err(|e| e.to_string())?;
     Ok(pairs)
 }

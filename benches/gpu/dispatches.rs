@@ -98,19 +98,12 @@ impl Clock {
     fn read(&self, count: u64) -> Result<Vec<f64>, String> {
         use wgpu::BufferUsages as U;
         let resolved = buffer(&self.plain, count * 8, U::QUERY_RESOLVE | U::COPY_SRC);
-        let copy = buffer(&self.plain, count * 8, U::MAP_READ | U::COPY_DST);
         let mut encoder = self.plain.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         encoder.resolve_query_set(&self.queries, 0..count as u32, &resolved, 0);
-        encoder.copy_buffer_to_buffer(&resolved, 0, &copy, 0, count * 8);
         self.plain.queue().submit([encoder.finish()]);
-        copy.map_async(wgpu::MapMode::Read, .., |_| {});
-        self.plain.wait_all().map_err(|e| e.to_string())?;
-        let bytes = copy.get_mapped_range(..).map_err(|e| e.to_string())?;
+        let words = self.plain.read_words(&resolved, 2 * count).map_err(|e| e.to_string())?;
         let period = f64::from(self.plain.queue().get_timestamp_period()) * 1e-9;
-        Ok(bytes
-            .chunks_exact(8)
-            .map(|b| u64::from_ne_bytes(b.try_into().unwrap_or_default()) as f64 * period)
-            .collect())
+        Ok(words.chunks_exact(2).map(|w| (u64::from(w[1]) << 32 | u64::from(w[0])) as f64 * period).collect())
     }
 }
 

@@ -1,9 +1,10 @@
 //! A method on WebGPU in a browser, which nothing may block.
 
 use super::adapters::adapters;
+use super::methods::id;
 use super::{Engine, Failure, Gpu, identity, unavailable};
-use sapwise::algorithm::{Backend, FramePlan};
-use sapwise::error::{GpuError, GpuErrorKind, ParseIdError};
+use sapwise::algorithm::FramePlan;
+use sapwise::error::{GpuError, GpuErrorKind};
 use sapwise::internals::Workers;
 use sapwise::{Aabb, AlgorithmId, Error, Pairs};
 
@@ -33,8 +34,7 @@ impl AsyncBroadPhase {
     /// # Errors
     /// As [`broad_phase`](super::broad_phase()).
     pub async fn new(gpu: &Gpu, method: &str) -> Result<Self, Error> {
-        let unknown = |e: ParseIdError| Error::UnknownAlgorithm { text: method.to_owned(), hint: e.to_string() };
-        let id = AlgorithmId::new(method, Backend::Gpu(vec![gpu.identity().index])).map_err(unknown)?;
+        let id = id(method, std::slice::from_ref(gpu))?;
         let refused = |error| unavailable(&id, error);
         let engine = Engine::new(gpu.clone(), method).map_err(refused)?;
         gpu.settle().await.map_err(refused)?;

@@ -292,6 +292,27 @@ impl Gpu {
         })
     }
 
+    /// Returns the first words of a buffer that can be copied from, for tests and benchmarks. No watch sees it.
+    ///
+    /// # Errors
+    /// The device refuses the memory, or was lost.
+    #[doc(hidden)]
+    pub fn read_words(&self, from: &wgpu::Buffer, count: u64) -> Result<Vec<u32>, GpuError> {
+        if count == 0 {
+            return Ok(Vec::new());
+        }
+        let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
+        let descriptor = wgpu::BufferDescriptor { label: None, size: 4 * count, usage, mapped_at_creation: false };
+        let copy = self.try_make(|device| device.create_buffer(&descriptor))?;
+        let mut encoder = self.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_buffer_to_buffer(from, 0, &copy, 0, 4 * count);
+        let submission = self.queue().submit([encoder.finish()]);
+        copy.map_async(wgpu::MapMode::Read, .., |_| {});
+        self.wait(submission)?;
+        let view = copy.get_mapped_range(..).map_err(|e| self.refusal("the device maps no memory", e))?;
+        Ok(bytemuck::cast_slice(&view).to_vec())
+    }
+
     /// Checks that the GPU can still be used.
     ///
     /// # Errors

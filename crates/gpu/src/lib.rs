@@ -108,8 +108,6 @@ pub use sapwise::internals::{GpuIdentity, GpuKind};
 #[doc(hidden)]
 pub use scope::Recording;
 pub use source::add_to;
-#[cfg(test)]
-pub(crate) use storage::words_for_tests;
 /// The version of wgpu whose buffers and devices this library takes. Its number is part of the name because another
 /// version has other types. A release that takes a newer wgpu exports it under a new name, and is a breaking one.
 pub use wgpu as wgpu30;

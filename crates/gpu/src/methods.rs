@@ -1,8 +1,9 @@
 //! The methods that run on GPUs, and the GPUs that work together.
 
-use sapwise::AlgorithmId;
+use super::Gpu;
 use sapwise::algorithm::{Backend, Entry};
 use sapwise::internals::{GpuIdentity, GpuKind};
+use sapwise::{AlgorithmId, Error};
 
 /// Name and revision of every method, the simplest first. A row here puts a method into every test, probe, sweep and
 /// plot. A revision counts up when the speed changes.
@@ -11,6 +12,18 @@ const METHODS: [(&str, u32); 4] = [("brute", 3), ("sap", 3), ("grid-sap", 4), ("
 /// Returns whether a method runs on GPUs.
 pub(super) fn has_method(name: &str) -> bool {
     METHODS.iter().any(|m| m.0 == name)
+}
+
+/// Returns the id of a method on GPUs, of which one may be there several times.
+///
+/// # Errors
+/// [`Error::UnknownAlgorithm`] without a GPU, or if `method` is no name.
+pub(super) fn id(method: &str, gpus: &[Gpu]) -> Result<AlgorithmId, Error> {
+    let mut indices: Vec<u32> = gpus.iter().map(|g| g.identity().index).collect();
+    indices.sort_unstable();
+    indices.dedup();
+    AlgorithmId::new(method, Backend::Gpu(indices))
+        .map_err(|e| Error::UnknownAlgorithm { text: method.to_owned(), hint: e.to_string() })
 }
 
 /// Returns each method on each of these GPUs alone, and on the first two, the first three and so on together.

@@ -1,9 +1,10 @@
 //! A method on one or several GPUs, from boxes in host memory to pairs in host memory.
 
+use super::methods::id;
 use super::share::{Share, sizes, worst};
 use super::{Failure, Gpu, Look, Slabs, unavailable};
-use sapwise::algorithm::{Backend, FramePlan, usable_cores};
-use sapwise::error::{GpuError, ParseIdError};
+use sapwise::algorithm::{FramePlan, usable_cores};
+use sapwise::error::GpuError;
 use sapwise::internals::{SceneStats, Threads, Workers, check_count};
 use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Pairs};
 use std::sync::Arc;
@@ -41,12 +42,7 @@ pub(super) struct OnGpus {
 /// [`Error::UnknownAlgorithm`] without a GPU or for another method; [`Error::Unavailable`] if a kernel does not
 /// compile or the GPU is out of memory.
 pub fn broad_phase(method: &str, gpus: Vec<Gpu>) -> Result<Box<dyn BroadPhase>, Error> {
-    let mut indices: Vec<u32> = gpus.iter().map(|g| g.identity().index).collect();
-    indices.sort_unstable();
-    indices.dedup();
-    let unknown = |e: ParseIdError| Error::UnknownAlgorithm { text: method.to_owned(), hint: e.to_string() };
-    let id = AlgorithmId::new(method, Backend::Gpu(indices)).map_err(unknown)?;
-    OnGpus::on(&id, gpus)
+    OnGpus::on(&id(method, &gpus)?, gpus)
 }
 
 impl OnGpus {

@@ -1,8 +1,8 @@
 //! A method on one GPU, from boxes on the GPU to pairs on the GPU.
 
+use super::methods::id;
 use super::{Engine, Failure, Gpu, Look, Params, unavailable};
-use sapwise::algorithm::Backend;
-use sapwise::error::{BoxDefect, ParseIdError};
+use sapwise::error::BoxDefect;
 use sapwise::internals::SampledBoxes;
 use sapwise::{Aabb, AlgorithmId, Error, Filter};
 
@@ -77,8 +77,7 @@ impl Resident {
     /// [`Error::UnknownAlgorithm`] if `method` is no name; [`Error::Unavailable`] if it does not run on GPUs, a
     /// kernel does not compile or the GPU is out of memory.
     pub fn new(gpu: &Gpu, method: &str) -> Result<Self, Error> {
-        let unknown = |e: ParseIdError| Error::UnknownAlgorithm { text: method.to_owned(), hint: e.to_string() };
-        let id = AlgorithmId::new(method, Backend::Gpu(vec![gpu.identity().index])).map_err(unknown)?;
+        let id = id(method, std::slice::from_ref(gpu))?;
         let engine = Engine::resident(gpu.clone(), method).map_err(|error| unavailable(&id, error))?;
         Ok(Self { id, engine, look: None, sample: None, last: None })
     }

@@ -102,22 +102,6 @@ fn create(gpu: &Gpu, label: &'static str, usage: wgpu::BufferUsages, bytes: u64)
         .map_err(|e| e.of(format!("gpu{} has no memory of {bytes} bytes for {label}", gpu.identity().index)))
 }
 
-/// Returns the first words of a buffer.
-#[cfg(test)]
-pub(crate) fn words_for_tests(gpu: &Gpu, buffer: &wgpu::Buffer, count: u32) -> Vec<u32> {
-    let size = u64::from(count) * 4;
-    let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
-    let descriptor = wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false };
-    let copy = gpu.device().create_buffer(&descriptor);
-    let mut encoder = gpu.record();
-    encoder.copy_buffer_to_buffer(buffer, 0, &copy, 0, size);
-    let submission = gpu.submit(encoder).unwrap();
-    copy.map_async(wgpu::MapMode::Read, .., |_| {});
-    gpu.wait(submission).unwrap();
-    let view = copy.get_mapped_range(..).unwrap();
-    bytemuck::cast_slice(&view).to_vec()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,11 +3,8 @@
 mod common;
 
 use common::{Random, gpus, naive, naive_filtered};
-use sapwise::algorithm::{Entry, Load};
-use sapwise::tuning::{AlgorithmCost, CostCurve, CostTerm, Source, Term};
-use sapwise::{
-    Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Filter, Membership, PairOrder, Pairs, Reason, Registry, Tuning,
-};
+use sapwise::{Aabb, Adaptive, BroadPhase, Error, Filter, Membership, PairOrder, Pairs, Reason, Registry, Tuning};
+use sapwise_gpu::kernel::Kernel;
 use sapwise_gpu::{Gpu, GpuIdentity, GpuKind, Gpus, Resident, broad_phase, wgpu30 as wgpu};
 use sapwise_scenes::Scenario;
 
@@ -28,25 +25,12 @@ fn pairs_of(algorithm: &mut dyn BroadPhase, boxes: &[Aabb]) -> Result<Vec<(u32, 
     Ok(pairs.as_slice().to_vec())
 }
 
-/// Returns the revision of an algorithm in this build.
-fn revision(id: &AlgorithmId) -> u32 {
-    let registry = Registry::with_cores(1);
-    let any = GpuIdentity::new(0, "any", GpuKind::Software);
-    let mut all = registry.entries().iter().cloned().chain(sapwise_gpu::algorithms([&any]));
-    let same = |e: &Entry| e.id.method() == id.method() && e.id.backend().class() == id.backend().class();
-    all.find(same).unwrap().revision
-}
-
 /// Returns a tuning in which each algorithm has a fixed cost.
 fn tuning(costs: &[(&str, f64)]) -> Tuning {
-    let cost = |&(id, unit_ns): &(&str, f64)| {
-        let curve = CostCurve::new(vec![CostTerm { term: Term::Call, unit_ns }]);
-        let id = id.parse().unwrap();
-        let revision = revision(&id);
-        AlgorithmCost::new(id, revision, curve, 0.0)
-    };
-    let loads: Vec<Load> = (0..16).map(|k| Load::of_objects(1 << k)).collect();
-    Tuning::from_costs(Source::Measured, "uniform", costs.iter().map(cost).collect(), &loads)
+    let any = GpuIdentity::new(0, "any", GpuKind::Software);
+    let entries = [Registry::with_cores(1).entries(), &sapwise_gpu::algorithms([&any])].concat();
+    let costs: Vec<(&str, f64, f64)> = costs.iter().map(|&(id, call)| (id, call, 0.0)).collect();
+    common::tuning(&entries, 0.0, &costs)
 }
 
 #[test]
@@ -183,31 +167,15 @@ fn occupy(gpu: &Gpu) {
             word = x;
         }";
     const TIMES: usize = 400;
-    let device = gpu.device();
-    let source = wgpu::ShaderSource::Wgsl(CHAIN.into());
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: None, source });
-    let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: None,
-        layout: None,
-        module: &module,
-        entry_point: Some("chain"),
-        compilation_options: Default::default(),
-        cache: None,
-    });
     let usage = wgpu::BufferUsages::STORAGE;
-    let word = device.create_buffer(&wgpu::BufferDescriptor { label: None, size: 4, usage, mapped_at_creation: false });
-    let bound = device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: None,
-        layout: &pipeline.get_bind_group_layout(0),
-        entries: &[wgpu::BindGroupEntry { binding: 0, resource: word.as_entire_binding() }],
-    });
-    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-    pass.set_pipeline(&pipeline);
-    pass.set_bind_group(0, &bound, &[]);
-    (0..TIMES).for_each(|_| pass.dispatch_workgroups(1, 1, 1));
+    let descriptor = wgpu::BufferDescriptor { label: None, size: 4, usage, mapped_at_creation: false };
+    let word = gpu.device().create_buffer(&descriptor);
+    let bound = Kernel::compile(gpu, CHAIN.to_owned(), "chain", &[]).unwrap().bind(gpu, &[(0, &word)]).unwrap();
+    let mut recording = gpu.record();
+    let mut pass = recording.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+    (0..TIMES).for_each(|_| bound.dispatch(&mut pass, 1));
     drop(pass);
-    gpu.queue().submit([encoder.finish()]);
+    gpu.submit(recording).unwrap();
 }
 
 /// Waits for a GPU. A software adapter that still works when its process ends would crash.

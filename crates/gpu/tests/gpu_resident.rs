@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::gpu::{upload, words};
+use common::gpu::upload;
 use common::{Random, gpus, naive, naive_filtered};
 use sapwise::error::BoxDefect;
 use sapwise::internals::Pair;
@@ -17,7 +17,7 @@ fn buffer(gpu: &Gpu, boxes: &[Aabb]) -> wgpu::Buffer {
 
 /// Downloads pairs, and sorts them.
 fn download(gpu: &Gpu, pairs: &wgpu::Buffer, count: u32) -> Vec<Pair> {
-    let words = words(gpu, pairs, 2 * u64::from(count));
+    let words = gpu.read_words(pairs, 2 * u64::from(count)).unwrap();
     let mut pairs: Vec<Pair> = words.chunks(2).map(|p| (p[0], p[1])).collect();
     pairs.sort_unstable();
     pairs
@@ -64,7 +64,7 @@ fn resident_frames_are_filtered() {
                 let pairs = resident.find_pairs(&on_gpu, 900).unwrap();
                 assert!(download(&gpu, pairs.buffer, pairs.count) == expected, "{method} on gpu{index}");
                 let submitted = resident.submit(&on_gpu, 900).unwrap();
-                let counts = words(&gpu, submitted.counts, 9);
+                let counts = gpu.read_words(submitted.counts, 9).unwrap();
                 assert_eq!(counts[0] as usize, expected.len(), "{method} on gpu{index}");
                 assert!(download(&gpu, submitted.pairs, counts[0]) == expected, "{method} on gpu{index}, submitted");
             }
@@ -86,7 +86,7 @@ fn submitted_frames_leave_pairs_and_counts_on_the_gpu() {
                 let expected = naive(&boxes);
                 let count = expected.len() as u32;
                 let submitted = resident.submit(&buffer(&gpu, &boxes), 800).unwrap();
-                let counts = words(&gpu, submitted.counts, 9);
+                let counts = gpu.read_words(submitted.counts, 9).unwrap();
                 assert_eq!(counts[..4], [count, 0, u32::MAX, 0], "{method}, frame {frame}");
                 assert_eq!(counts[5..], [count.div_ceil(64), 1, 1, count], "{method}");
                 let found = download(&gpu, submitted.pairs, count);
@@ -99,10 +99,10 @@ fn submitted_frames_leave_pairs_and_counts_on_the_gpu() {
             }
             // If the list is too small, the counts say so, and a later frame has a larger one.
             let dense = buffer(&gpu, &[Aabb::cube([1.0; 3], 1.0); 600]);
-            let counts = |resident: &mut Resident| words(&gpu, resident.submit(&dense, 600).unwrap().counts, 9);
-            let first = counts(&mut resident);
+            let words = |of: &mut Resident| gpu.read_words(of.submit(&dense, 600).unwrap().counts, 9).unwrap();
+            let first = words(&mut resident);
             assert!(first[0] == 600 * 599 / 2 && first[8] < first[0], "{method}: {first:?}");
-            let second = counts(&mut resident);
+            let second = words(&mut resident);
             let last = resident.last().unwrap();
             assert!(!last.whole && last.pairs == 600 * 599 / 2, "{method}: {last:?}");
             assert_eq!((second[0], second[8]), (600 * 599 / 2, 600 * 599 / 2), "{method}");
@@ -110,9 +110,10 @@ fn submitted_frames_leave_pairs_and_counts_on_the_gpu() {
             let mut bad = random.cubes(100, [9.0; 3], 0.5);
             bad[42].max[1] = f32::NAN;
             let on_gpu = buffer(&gpu, &bad);
-            assert_eq!(words(&gpu, resident.submit(&on_gpu, 100).unwrap().counts, 9)[2], 42 << 1, "{method}");
+            let counts = gpu.read_words(resident.submit(&on_gpu, 100).unwrap().counts, 9).unwrap();
+            assert_eq!(counts[2], 42 << 1, "{method}");
             let none = resident.submit(&on_gpu, 0).unwrap();
-            assert_eq!(words(&gpu, none.counts, 9)[5..], [0, 1, 1, 0], "{method}");
+            assert_eq!(gpu.read_words(none.counts, 9).unwrap()[5..], [0, 1, 1, 0], "{method}");
             assert_eq!(resident.last().unwrap().invalid, Some((42, BoxDefect::NotANumber)), "{method}");
         }
     }

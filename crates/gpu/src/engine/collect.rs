@@ -2,10 +2,9 @@
 
 use super::{Engine, Frame, PAIRS_AT, Pending, Step};
 use crate::{Failure, Header, PAIR, Params, Place};
-use sapwise::Error;
-use sapwise::Pairs;
 use sapwise::error::GpuError;
 use sapwise::internals::{SampledBoxes, Workers};
+use sapwise::{Error, Pairs};
 use std::mem::{offset_of, take};
 use std::time::Duration;
 

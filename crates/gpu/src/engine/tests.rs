@@ -1,13 +1,12 @@
 use super::{Engine, Pending};
 use crate::kernel::dispatched;
-use crate::{Failure, Gpus, Header, Look, Output, Params, Storage, first_for_tests, words_for_tests};
+use crate::{Failure, Gpus, Header, Look, Output, Params, Storage, first_for_tests};
 use bytemuck::{bytes_of, cast_slice};
 use pollster::block_on;
-use sapwise::Aabb;
 use sapwise::algorithm::FramePlan;
 use sapwise::error::GpuErrorKind;
 use sapwise::internals::{SampledBoxes, Workers};
-use sapwise::{Filter, Membership, PairOrder, Pairs};
+use sapwise::{Aabb, Filter, Membership, PairOrder, Pairs};
 use sapwise_scenes::Scenario;
 use wgpu::util::DeviceExt;
 
@@ -97,7 +96,7 @@ fn resident_pairs_of_several_submissions_are_contiguous() {
 
 /// Returns the pairs that stayed on the GPU, sorted.
 fn pairs_on_cpu(engine: &Engine, count: u32) -> Vec<(u32, u32)> {
-    let list = words_for_tests(&engine.gpu, engine.pairs_buffer(), 2 * count);
+    let list = engine.gpu.read_words(engine.pairs_buffer(), 2 * u64::from(count)).unwrap();
     let mut pairs: Vec<(u32, u32)> = list.chunks(2).map(|pair| (pair[0], pair[1])).collect();
     pairs.sort_unstable();
     pairs
@@ -128,8 +127,8 @@ fn positions_of_any_number_of_blocks_are_the_sums_before_them() {
         gpu.submit(encoder).unwrap();
         let sums = |end: u32| counts[..end as usize].iter().sum::<u32>();
         let expected: Vec<u32> = (0..=blocks).map(sums).collect();
-        assert!(words_for_tests(&gpu, output.sums(), blocks + 1) == expected, "{blocks} blocks");
-        assert_eq!(words_for_tests(&gpu, header.buffer(), 2), [sums(blocks), 0], "{blocks} blocks");
+        assert!(gpu.read_words(output.sums(), u64::from(blocks) + 1).unwrap() == expected, "{blocks} blocks");
+        assert_eq!(gpu.read_words(header.buffer(), 2).unwrap(), [sums(blocks), 0], "{blocks} blocks");
     }
 }
 
