@@ -4,25 +4,7 @@ use crate::figures::plain;
 use std::fmt::Write;
 
 /// What stands before the sections. The name of the generator marks a folder as that of a study.
-pub(super) const HEAD: &str = "<!doctype html>
-<html lang=\"en\">
-<head>
-<meta charset=\"utf-8\">
-<meta name=\"generator\" content=\"sapwise study\">
-<meta name=\"viewport\" content=\"width=device-width\">
-<title>Sapwise study</title>
-<style>
-body { font: 16px/1.4 sans-serif; max-width: 1400px; margin: auto; padding: 1em; color: #000; background: #fff }
-figure { margin: 1em 0 } figure svg { max-width: 100%; height: auto }
-.wide { overflow-x: auto } table { border-collapse: collapse } caption { text-align: left; padding: .4em 0 }
-th, td { border-bottom: 1px solid #ccc; padding: .2em .6em; text-align: right; white-space: nowrap }
-th:first-child, td:first-child { text-align: left }
-.lacks { font-style: italic }
-</style>
-</head>
-<body>
-<h1>Hardware against broad-phase performance</h1>
-";
+pub(super) const HEAD: &str = include_str!("head.html");
 
 /// A page under way.
 #[derive(Debug, Default)]
