@@ -6,7 +6,6 @@ pub use crate::entry::Entry;
 pub use crate::load::{Displacement, FramePlan, Load, Motion};
 pub use crate::registry::{AlgorithmSource, usable_cores};
 
-use crate::described::described;
 use std::fmt;
 use std::str::FromStr;
 
@@ -42,7 +41,7 @@ pub enum Backend {
     Gpu(Vec<u32>),
 }
 
-described! {
+crate::described! {
     /// The class of a processor. A method has one cost model and one revision in each class.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]

@@ -2,6 +2,8 @@
 
 /// Defines an enum with the text of each variant beside it: `Display` writes it, with the fields in it by their names.
 /// A second text behind `|` is the one for `{:#}`.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! described {
     ($(#[$meta:meta])* pub enum $name:ident {
         $(
@@ -29,4 +31,3 @@ macro_rules! described {
         }
     };
 }
-pub(crate) use described;

@@ -3,7 +3,6 @@
 mod gpu;
 
 use crate::algorithm::AlgorithmId;
-use crate::described::described;
 use crate::space::Handle;
 
 pub use crate::algorithm::ParseIdError;
@@ -13,7 +12,7 @@ pub use crate::ray::RayDefect;
 pub use crate::tuning::TuningError;
 pub use gpu::{GpuError, GpuErrorKind};
 
-described! {
+crate::described! {
     /// Why a broad phase returned no answer. The content of the pairs is unspecified after an error.
     ///
     /// ```
@@ -108,7 +107,7 @@ described! {
     }
 }
 
-described! {
+crate::described! {
     /// What makes a box invalid.
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
     #[non_exhaustive]
@@ -120,7 +119,7 @@ described! {
     }
 }
 
-described! {
+crate::described! {
     /// Why an algorithm can't run here.
     ///
     /// ```

@@ -1,7 +1,5 @@
 //! The ray, a query of a scene.
 
-use crate::described::described;
-
 /// A ray, or the segment of one: the points `origin + t × direction` with `0 <= t <= max`.
 ///
 /// ```
@@ -21,7 +19,7 @@ pub struct Ray {
     pub max: f32,
 }
 
-described! {
+crate::described! {
     /// What makes a ray invalid.
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
     #[non_exhaustive]

@@ -1,12 +1,11 @@
 //! What was decided for a frame, and why.
 
 use crate::algorithm::AlgorithmId;
-use crate::described::described;
 use crate::load::Load;
 use crate::tuning::Source;
 use std::fmt;
 
-described! {
+crate::described! {
     /// Why an algorithm was chosen.
     ///
     /// ```

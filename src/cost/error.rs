@@ -1,11 +1,10 @@
 //! What makes a cost curve unusable.
 
 use super::{MOST_UNIT_NS, Product, Term};
-use crate::described::described;
 
 const MOST_POWERS: u32 = Product::MOST_POWERS;
 
-described! {
+crate::described! {
     /// What makes a cost curve unusable.
     #[derive(Debug, Clone, Copy, PartialEq)]
     #[non_exhaustive]

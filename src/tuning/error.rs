@@ -2,9 +2,8 @@
 
 use crate::AlgorithmId;
 use crate::cost::CurveError;
-use crate::described::described;
 
-described! {
+crate::described! {
     /// What makes a tuning unusable.
     #[derive(Debug, Clone, PartialEq)]
     #[non_exhaustive]

@@ -286,8 +286,9 @@ fn nanoseconds(components: &[Component], profile: &Profile, row: &Row) -> Result
     let (hardware, backend) = (&profile.hardware, profile.id(row.algorithm).backend());
     let cache = hardware.value(ParameterId::CacheLlcBytes).filter(|c| *c > 0.0);
     let cache = match backend.class() {
-        BackendClass::Cpu => cache
-            .ok_or_else(|| PredictError::Missing { parameter: ParameterId::CacheLlcBytes.to_string(), why: None })?,
+        BackendClass::Cpu => {
+            cache.ok_or_else(|| PredictError::NotListed { parameter: ParameterId::CacheLlcBytes.to_string() })?
+        }
         BackendClass::Gpu => 0.0,
     };
     let sum = |component: &Component| -> Result<f64, PredictError> {

@@ -22,11 +22,11 @@ pub(super) fn needed_of_gpu(gpu: &GpuHardware, id: GpuParameterId) -> Result<f64
 fn above_zero(list: &[Parameter], name: &str, of: &str) -> Result<f64, PredictError> {
     let parameter = || format!("{name}{of}");
     let Some(found) = Parameter::find(list, name) else {
-        return Err(PredictError::Missing { parameter: parameter(), why: None });
+        return Err(PredictError::NotListed { parameter: parameter() });
     };
     match found.value {
         Some(value) if value > 0.0 && value.is_finite() => Ok(value),
         Some(value) => Err(PredictError::Value { parameter: parameter(), value }),
-        None => Err(PredictError::Missing { parameter: parameter(), why: Some(found.source.clone()) }),
+        None => Err(PredictError::Missing { parameter: parameter(), why: found.source.clone() }),
     }
 }

@@ -6,8 +6,7 @@ use crate::GpuHardware;
 use crate::hardware::{Hardware, with_unit};
 use crate::stats::NORMAL_90;
 use sapwise::algorithm::{Backend, BackendClass, Entry, Load};
-use sapwise::internals::GpuKind;
-use sapwise::internals::{Fallback, Work};
+use sapwise::internals::{Fallback, GpuKind, Work};
 use sapwise::tuning::{AlgorithmCost, Source};
 use sapwise::{AlgorithmId, Tuning};
 use std::sync::Arc;
@@ -120,7 +119,7 @@ impl Model {
             ));
         }
         if p.costs.is_empty() {
-            return Err(PredictError::Nothing { model: p.model, warnings: p.warnings });
+            return Err(PredictError::Nothing { model: p.model, warnings: p.warnings.join("; ") });
         }
         Ok(p)
     }
