@@ -133,8 +133,9 @@ impl Machine {
         let together = [(GpuParameterId::GroupUploadRatio, 1.4), (GpuParameterId::GroupRoundTripRatio, 1.2)];
         let group = GpuGroup::new((0..gpus.len() as u32).collect(), together.map(measured).into());
         let gpu_groups = if gpus.len() > 1 { vec![group] } else { Vec::new() };
-        let hardware = Hardware::new(sapwise_tune::Machine::of(self.name), parameters.into());
-        hardware.with_gpus(gpus).with_gpu_groups(gpu_groups)
+        let mut hardware = Hardware::new(sapwise_tune::Machine::of(self.name), parameters.into()).with_gpus(gpus);
+        hardware.gpu_groups = gpu_groups;
+        hardware
     }
 
     /// A full sweep: 23 sizes from 16 to 700 000 objects of two scenarios; from 500 objects up whoever is eight times

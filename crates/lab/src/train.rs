@@ -51,12 +51,12 @@ pub fn train(selection: Selection, name: &str, progress: &dyn Progress) -> Resul
         bail!("no report can be trained on: {why}; measure one with `sapwise probe --out R.json` of a release build");
     }
     let designs = Designs::new(&profiles);
-    let (model, left_out) = model(&designs, &vec![true; profiles.len()], name)?;
+    let (mut model, left_out) = model(&designs, &vec![true; profiles.len()], name)?;
     notes.extend(designs.notes.iter().cloned());
     notes.extend(left_out);
     let validated = validate(&profiles, &designs, &Partition::new(&profiles), progress)?;
     notes.extend(validated.notes.into_iter().filter(|note| !notes.contains(note)).collect::<Vec<_>>());
-    let model = model.with_intervals(validated.validation.coverage.map(|c| c.ratios_90_ln));
+    model.ratios_90_ln = validated.validation.coverage.map(|c| c.ratios_90_ln);
     let report = |p: &Profile| TrainingReport { file: p.file.clone(), host: p.machine().to_owned(), label: p.label };
     let training = Training { trained_on: profiles.iter().map(report).collect(), validation: validated.validation };
     Ok(Trained { model, training, notes, held_out: validated.held_out })

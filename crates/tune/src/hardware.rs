@@ -90,12 +90,6 @@ impl Hardware {
         Self { gpus, ..self }
     }
 
-    /// Replaces the groups of GPUs.
-    #[must_use]
-    pub fn with_gpu_groups(self, gpu_groups: Vec<GpuGroup>) -> Self {
-        Self { gpu_groups, ..self }
-    }
-
     /// Returns the value of a parameter unless it is missing.
     pub fn value(&self, id: ParameterId) -> Option<f64> {
         self.value_named(id.as_str())

@@ -11,8 +11,7 @@ mod scale;
 
 use crate::hardware::ParameterId;
 use sapwise::algorithm::BackendClass;
-use sapwise::internals::GpuKind;
-use sapwise::internals::Places;
+use sapwise::internals::{GpuKind, Places};
 use sapwise::tuning::Term;
 use std::sync::Arc;
 
@@ -166,18 +165,6 @@ impl Model {
     /// Creates a model of these methods from the ranges of its training.
     pub fn new(name: impl Into<String>, methods: Vec<MethodModel>, ranges: Vec<Range>) -> Self {
         Self { name: name.into(), ranges, ratios_90_ln: None, places: Arc::new(Places::new(Vec::new())), methods }
-    }
-
-    /// Sets [`ratios_90_ln`](Self::ratios_90_ln).
-    #[must_use]
-    pub fn with_intervals(self, ratios_90_ln: Option<f64>) -> Self {
-        Self { ratios_90_ln, ..self }
-    }
-
-    /// Sets the places of the residuals.
-    #[must_use]
-    pub fn with_places(self, places: Arc<Places>) -> Self {
-        Self { places, ..self }
     }
 
     /// Returns the hardware parameters that a prediction reads, without those of GPUs, each once: for costs and for

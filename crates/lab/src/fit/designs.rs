@@ -10,7 +10,6 @@ use anyhow::Result;
 use sapwise::algorithm::BackendClass;
 use sapwise::internals::Places;
 use sapwise_tune::model::MethodModel;
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// The rows of every method with all that a fit needs, worked out once for all fits to parts of the profiles.
@@ -24,15 +23,6 @@ pub struct Designs<'a> {
     pub(super) methods: Vec<Design>,
     pub(super) basis: Basis,
     /// What was left out because a parameter is missing.
-    pub notes: Vec<String>,
-}
-
-/// The fitted models of the methods.
-#[derive(Debug, Clone)]
-pub struct Fitted {
-    /// One for each method on each class of processor.
-    pub methods: Vec<MethodModel>,
-    /// What was left out and why.
     pub notes: Vec<String>,
 }
 
@@ -65,10 +55,11 @@ impl<'a> Designs<'a> {
     }
 
     /// Fits a cost model for each method and class of processor that the chosen profiles hold enough timings of.
+    /// Returns them with sentences on what was left out and why.
     ///
     /// # Errors
     /// When a residual can't be solved for.
-    pub fn fit(&self, chosen: &[bool]) -> Result<Fitted> {
+    pub fn fit(&self, chosen: &[bool]) -> Result<(Vec<MethodModel>, Vec<String>)> {
         let (mut models, mut notes): (Vec<MethodModel>, _) = (Vec::new(), Vec::new());
         for design in &self.methods {
             let other = fallback_method(&design.method)
@@ -92,7 +83,7 @@ impl<'a> Designs<'a> {
                 }
             }
         }
-        Ok(Fitted { methods: models, notes })
+        Ok((models, notes))
     }
 }
 
@@ -105,14 +96,8 @@ fn reported_terms(profiles: &[Profile], method: &str, class: BackendClass) -> Op
 
 /// Returns the position of the physical machine of each profile.
 fn machines(profiles: &[Profile]) -> Vec<usize> {
-    let mut known: BTreeMap<&str, usize> = BTreeMap::new();
-    profiles
-        .iter()
-        .map(|p| {
-            let next = known.len();
-            *known.entry(p.machine()).or_insert(next)
-        })
-        .collect()
+    let known = once(profiles.iter().map(Profile::machine));
+    profiles.iter().filter_map(|p| known.iter().position(|m| *m == p.machine())).collect()
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ mod rows;
 mod terms;
 mod weights;
 
-pub use designs::{Designs, Fitted};
+pub use designs::Designs;
 pub(crate) use measured_costs::costs_of_one;
 pub use measured_costs::measured_costs;
 pub use measured_tuning::{measured_slice, measured_tuning, slice_tuning};

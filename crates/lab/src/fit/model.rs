@@ -1,6 +1,6 @@
 //! A model, fitted to profiles.
 
-use super::designs::{Designs, Fitted};
+use super::designs::Designs;
 use crate::data::{COMPARED, COMPARED_OF_GPUS, Profile, is_real};
 use crate::spread;
 use anyhow::{Result, bail};
@@ -14,10 +14,11 @@ use std::sync::Arc;
 /// # Errors
 /// When no method could be fitted, or a regression fails.
 pub fn model(designs: &Designs<'_>, chosen: &[bool], name: &str) -> Result<(Model, Vec<String>)> {
-    let Fitted { methods, notes } = designs.fit(chosen)?;
+    let (methods, notes) = designs.fit(chosen)?;
     let profiles: Vec<&Profile> =
         designs.profiles.iter().zip(chosen).filter(|(_, chosen)| **chosen).map(|(p, _)| p).collect();
-    let model = Model::new(name, methods, ranges(&profiles)).with_places(Arc::clone(&designs.basis.places));
+    let mut model = Model::new(name, methods, ranges(&profiles));
+    model.places = Arc::clone(&designs.basis.places);
     if let Some(defect) = model.defect() {
         bail!("no model could be fitted: {}", [vec![defect], notes].concat().join("; "));
     }

@@ -15,11 +15,10 @@ fn fitted(profiles: &[Profile]) -> (Vec<MethodModel>, Vec<String>) {
 
 fn whole(profiles: &[Profile]) -> (Model, Vec<String>) {
     let designs = Designs::new(profiles);
-    let Fitted { methods, notes } = designs.fit(&vec![true; profiles.len()]).unwrap();
-    (
-        Model::new("test", methods, Vec::new()).with_places(Arc::clone(&designs.basis.places)),
-        [designs.notes.clone(), notes].concat(),
-    )
+    let (methods, notes) = designs.fit(&vec![true; profiles.len()]).unwrap();
+    let mut model = Model::new("test", methods, Vec::new());
+    model.places = Arc::clone(&designs.basis.places);
+    (model, [designs.notes, notes].concat())
 }
 
 /// What a model predicts for the measured rows of a profile over what was measured.
@@ -132,7 +131,7 @@ fn the_residual_repairs_a_term_that_is_missing() {
 #[test]
 fn a_scenario_that_is_left_out_is_not_looked_at() {
     let mut all = profiles(Machine::family().into_iter().take(3));
-    let fit = |all: &[Profile]| Designs::without(all, Some("clustered")).fit(&[true; 3]).unwrap().methods;
+    let fit = |all: &[Profile]| Designs::without(all, Some("clustered")).fit(&[true; 3]).unwrap().0;
     let before = fit(&all);
     // A hundred times as slow there, but for who is best: what lies how far behind is a weight.
     for spot in all.iter_mut().flat_map(|p| &mut p.points).filter(|s| s.scenario == "clustered") {
