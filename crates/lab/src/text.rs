@@ -33,16 +33,6 @@ pub fn count(number: usize, thing: &str) -> String {
     format!("{number} {thing}{}", if number == 1 { "" } else { "s" })
 }
 
-/// Nanoseconds with the unit that keeps one to three digits before the point.
-pub fn duration(ns: f64) -> String {
-    match ns {
-        _ if ns < 1e3 => format!("{ns:.0} ns"),
-        _ if ns < 1e6 => format!("{:.2} µs", ns / 1e3),
-        _ if ns < 1e9 => format!("{:.2} ms", ns / 1e6),
-        _ => format!("{:.2} s", ns / 1e9),
-    }
-}
-
 /// A whole number with a blank between groups of three digits.
 pub fn grouped(number: u64) -> String {
     let digits = number.to_string();
@@ -77,9 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn figures_have_readable_units() {
-        assert_eq!(duration(512.4), "512 ns");
-        assert_eq!(duration(1_234_567.0), "1.23 ms");
+    fn digits_are_grouped() {
         assert_eq!(grouped(1_000_000), "1 000 000");
         assert_eq!(grouped(12), "12");
     }

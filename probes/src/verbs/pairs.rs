@@ -10,9 +10,10 @@ use sapwise::algorithm::usable_cores;
 use sapwise::error::Unavailable;
 use sapwise::{AlgorithmId, BroadPhase, Pairs, Registry};
 use sapwise_lab::sweep::median;
-use sapwise_lab::text::{count, duration, grouped};
+use sapwise_lab::text::{count, grouped};
 use sapwise_lab::write::write_atomically;
 use sapwise_scenes::{Frames, write_pairs};
+use sapwise_tune::hardware::with_unit;
 use serde::Serialize;
 use std::time::Instant;
 
@@ -151,7 +152,7 @@ fn text(answer: &Answer, median_ns: f64) -> String {
         if *objects == 1 { "box" } else { "boxes" },
         count(*frames, "frame"),
         count(samples_ms.len(), "sample"),
-        duration(median_ns)
+        with_unit("_ns", median_ns)
     )
 }
 

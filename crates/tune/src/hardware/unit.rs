@@ -64,6 +64,7 @@ mod tests {
         assert_eq!(with_unit("bandwidth_one_thread_gb_per_s", 12.345), "12.3 GB/s");
         assert_eq!(with_unit("latency_16_kib_ns", 1.26), "1.3 ns");
         assert_eq!(with_unit("fork_join_cold_ns", 12_500.0), "12.50 µs");
+        assert_eq!(with_unit("fork_join_cold_ns", 1_234_567.0), "1.23 ms");
         assert_eq!(with_unit("scaling_two_threads_ratio", 1.9), "1.90 ×");
         assert_eq!(with_unit("usable_cores", 2.0), "2");
         assert_eq!(with_unit("arithmetic_gflop_per_s", 51_234.5), "51234 GFLOP/s");

@@ -6,7 +6,8 @@ use crate::replay::{Outcome, Part, ReplaySettings, Times, WINDOW};
 use crate::shell;
 use crate::terminal::Terminal;
 use sapwise::AlgorithmId;
-use sapwise_lab::text::{count, duration, grouped};
+use sapwise_lab::text::{count, grouped};
+use sapwise_tune::hardware::with_unit;
 use serde_json::{Map, Value, json};
 
 /// A run with everything that is said about it.
@@ -133,7 +134,7 @@ impl Answer<'_> {
     fn totals(&self, terminal: Terminal) -> String {
         let outcome = self.outcome;
         let row = |name: &str, t: &Times, ran: String| {
-            let times = [t.total_ms, t.median_ms, t.p99_ms, t.worst_ms].map(|ms| duration(ms * 1e6));
+            let times = [t.total_ms, t.median_ms, t.p99_ms, t.worst_ms].map(|ms| with_unit("_ns", ms * 1e6));
             [&[name.to_owned()], &times[..], &[ran]].concat()
         };
         let head = ["run by", "total", "median", "p99", "worst", "chosen in"];
@@ -154,7 +155,8 @@ impl Answer<'_> {
     fn comparison(&self, terminal: Terminal) -> String {
         let row = |frames: String, p: &Part| {
             let single = p.over_best_fixed.map_or("-".to_owned(), |ratio| format!("{ratio:.3}"));
-            let times = [p.adaptive.median_ms, p.adaptive.p99_ms, p.adaptive.worst_ms].map(|ms| duration(ms * 1e6));
+            let times =
+                [p.adaptive.median_ms, p.adaptive.p99_ms, p.adaptive.worst_ms].map(|ms| with_unit("_ns", ms * 1e6));
             let counts = [p.switches, p.explored].map(|n| n.to_string());
             [&[frames, single, format!("{:.3}", p.over_windows)][..], &times, &counts].concat()
         };
