@@ -34,7 +34,7 @@ fuzz_target!(|text: &str| {
         write_and_run(tuning);
     }
     if let Ok(model) = json::model(text) {
-        let written = json::write_model(&model).unwrap();
+        let written = json::Format::MODEL.write(&model).unwrap();
         assert_eq!(json::model(&written).unwrap(), model);
         predict(&model, &HARDWARE);
     }

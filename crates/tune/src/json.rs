@@ -51,15 +51,6 @@ pub fn write_tuning(tuning: &Tuning) -> Result<String, Error> {
     Format::TUNING.write(tuning)
 }
 
-/// Writes the predicting part of a model, one key a line.
-///
-/// # Errors
-/// [`Error::Write`] when `serde_json` refuses a value. A number that is not finite becomes `null`, which no reader
-/// takes.
-pub fn write_model(model: &Model) -> Result<String, Error> {
-    Format::MODEL.write(model)
-}
-
 /// Writes a value without a schema, one key a line.
 ///
 /// # Errors

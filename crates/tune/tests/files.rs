@@ -33,7 +33,7 @@ fn the_built_in_model_knows_every_method_of_this_build() {
 fn every_schema_version_stays_readable() {
     let model = json::model(include_str!("fixtures/model-5.json")).unwrap();
     assert!(model.methods.len() == 3 && model.methods.iter().all(|m| m.backend == BackendClass::Cpu));
-    let written = json::write_model(&model).unwrap();
+    let written = json::Format::MODEL.write(&model).unwrap();
     assert!(json::model(&written).unwrap() == model);
     let tuning = json::tuning(include_str!("fixtures/tuning-3.json")).unwrap();
     assert_eq!(json::tuning(&json::write_tuning(&tuning).unwrap()).unwrap(), tuning);

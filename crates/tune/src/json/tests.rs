@@ -62,7 +62,7 @@ fn an_error_has_its_path_and_line() {
 #[test]
 fn a_model_is_read_without_the_notes_of_its_training() {
     let built_in = Model::built_in().unwrap();
-    let text = write_model(&built_in).unwrap();
+    let text = Format::MODEL.write(&built_in).unwrap();
     assert!(!text.contains("\"training\""));
     assert_eq!(model(&text).unwrap(), built_in);
     let read = Format::MODEL.read::<Model>(include_str!("../../../../models/default.json")).unwrap();
