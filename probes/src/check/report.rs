@@ -6,9 +6,8 @@ use crate::{date, revisions};
 use sapwise::algorithm::SimdLevel;
 use sapwise_lab::report::{Label, Point, Report};
 use sapwise_tune::hardware::ParameterId;
-use sapwise_tune::measure::Watch;
 use sapwise_tune::stats::median;
-use sapwise_tune::{GpuHardware, Hardware};
+use sapwise_tune::{GpuHardware, Hardware, Parameter};
 use std::collections::BTreeSet;
 
 /// Several threads may be up to this factor faster than their number, by a clock that rises between two measurements.
@@ -160,12 +159,12 @@ pub(crate) fn doubts(report: &Report) -> Vec<String> {
         cut_short.map(|remark| format!("it was cut short: {remark}; measure again for all of it")).collect();
     found.extend(hardware_doubts(&report.hardware));
     let loads: Vec<f64> = report.points.iter().filter_map(|p| p.foreign_load).collect();
-    let disturbed = loads.iter().filter(|&&load| load > Watch::SPOILING).count();
+    let disturbed = loads.iter().filter(|&&load| load > Parameter::SPOILING).count();
     if disturbed as f64 > DISTURBED_SHARE * loads.len() as f64 {
         found.push(format!(
             "other programs took over {:.0} % of the CPU at {disturbed} of {} points ({:.0} %); measure again with \
              nothing else running",
-            Watch::SPOILING * 100.0,
+            Parameter::SPOILING * 100.0,
             loads.len(),
             disturbed as f64 / loads.len() as f64 * 100.0
         ));

@@ -10,6 +10,7 @@ use sapwise::{Aabb, AlgorithmId, BroadPhase, Pairs};
 use sapwise_lab::report::{Point, Timing};
 use sapwise_lab::sweep::{WARM_UP, next_frame};
 use sapwise_scenes::{Random, Scene};
+use sapwise_tune::Parameter;
 use sapwise_tune::measure::{Options, Watch, core_to_core_ns};
 use std::time::{Duration, Instant};
 
@@ -127,7 +128,7 @@ impl Race {
             let kept = fresh.min(MOST_FRAMES - frames);
             let spent = began.elapsed();
             let redo = thrown < MOST_REDONE * (windows + 1)
-                && foreign.is_some_and(|f| f > Watch::SPOILING)
+                && foreign.is_some_and(|f| f > Parameter::SPOILING)
                 && spent + shortest * (fresh as u32) < time.mul_f64(REDO_SHARE);
             for racer in racers.iter_mut() {
                 racer.keep(frames, if redo { 0 } else { kept });

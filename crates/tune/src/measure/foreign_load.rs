@@ -5,8 +5,6 @@
 
 use std::time::{Duration, Instant};
 
-use crate::hardware::Parameter;
-
 /// Ticks a second of `/proc/stat`: `USER_HZ`, 100 on every Linux architecture that Rust's standard library supports.
 const TICKS_PER_SECOND: f64 = 100.0;
 
@@ -21,9 +19,6 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Share of the CPU above which a measurement counts as spoiled.
-    pub const SPOILING: f64 = Parameter::SPOILING;
-
     /// Begins to watch.
     #[must_use]
     pub fn begin() -> Self {

@@ -51,7 +51,7 @@ impl Plan<'_> {
                 }
             }
             windows.push(Window { rows, foreign_load: watch.foreign_load() });
-            let clean: usize = windows.iter().filter(|w| w.load() <= Watch::SPOILING).map(|w| w.rows.len()).sum();
+            let clean: usize = windows.iter().filter(|w| w.load() <= Parameter::SPOILING).map(|w| w.rows.len()).sum();
             let over = start.elapsed() + watch.elapsed() > self.limit;
             if clean >= self.samples || over || self.options.is_stopped() {
                 return Ok(Samples::keep(windows, self.samples));
@@ -86,7 +86,7 @@ impl<const N: usize> Samples<N> {
     fn keep(windows: Vec<Window<N>>, wanted: usize) -> Self {
         let mut loads: Vec<f64> = windows.iter().flat_map(|w| w.rows.iter().map(|_| w.load())).collect();
         loads.sort_unstable_by(f64::total_cmp);
-        let highest = loads.get(wanted.min(loads.len()).max(1) - 1).map_or(0.0, |load| load.max(Watch::SPOILING));
+        let highest = loads.get(wanted.min(loads.len()).max(1) - 1).map_or(0.0, |load| load.max(Parameter::SPOILING));
         let (kept, spoiled): (Vec<_>, Vec<_>) = windows.into_iter().partition(|w| w.load() <= highest);
         Self {
             spoiled: spoiled.iter().map(|w| w.rows.len() as u32).sum(),
