@@ -48,24 +48,17 @@ fn the_cards_hold_the_figures_of_the_paper_and_nothing_else() {
         ];
         assert!(report.hardware.machine.cpu.contains(cpu), "{file}: {}", report.hardware.machine.cpu);
         let of_cpu = [(ParameterId::PhysicalCores.as_str(), cores), (ParameterId::ClockReportedGhz.as_str(), ghz)];
-        for (list, figures) in [(&card.parameters, &of_card[..]), (&report.hardware.parameters, &of_cpu[..])] {
-            for p in list {
-                match figures.iter().find(|f| f.0 == p.name) {
-                    Some(&(name, value)) => {
-                        let found = p.value.unwrap_or_else(|| panic!("{file}: {name} is missing"));
-                        assert!((found / value - 1.0).abs() < 1e-9, "{file}: {name} is {found}, printed {value}");
-                        assert_eq!(p.how, How::Published, "{file}: {name}");
-                        assert!(p.source.contains("ISVRI 2011"), "{file}: {name}: {}", p.source);
-                    }
-                    None => {
-                        assert!(
-                            p.value.is_none() && p.how == How::Missing && !p.source.is_empty(),
-                            "{file}: {}",
-                            p.name
-                        );
-                    }
-                }
-            }
+        let of_card = card.parameters.iter().map(|p| (p, of_card.iter().find(|f| f.0 == p.name)));
+        let of_cpu = report.hardware.parameters.iter().map(|p| (p, of_cpu.iter().find(|f| f.0 == p.name)));
+        for (p, printed) in of_card.chain(of_cpu) {
+            let Some((name, value)) = printed else {
+                assert!(p.value.is_none() && p.how == How::Missing && !p.source.is_empty(), "{file}: {}", p.name);
+                continue;
+            };
+            let found = p.value.unwrap_or_else(|| panic!("{file}: {name} is missing"));
+            assert!((found / value - 1.0).abs() < 1e-9, "{file}: {name} is {found}, printed {value}");
+            assert_eq!(p.how, How::Published, "{file}: {name}");
+            assert!(p.source.contains("ISVRI 2011"), "{file}: {name}: {}", p.source);
         }
     }
 }
