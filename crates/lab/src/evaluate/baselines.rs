@@ -6,9 +6,8 @@ use crate::data::{COMPARED, COMPARED_OF_GPUS, Profile, figure};
 use sapwise::algorithm::BackendClass;
 use sapwise::tuning::AlgorithmCost;
 use sapwise::{AlgorithmId, Tuning};
-use sapwise_tune::Hardware;
 use sapwise_tune::model::GPU_PREFIX;
-use sapwise_tune::stats;
+use sapwise_tune::{Hardware, stats};
 use std::collections::BTreeMap;
 
 /// Always chooses the role with the least mean regret over the training profiles that have it, each of which comes with

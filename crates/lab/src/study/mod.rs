@@ -8,15 +8,14 @@ mod machines;
 mod map;
 mod page;
 
-use crate::Report;
-use crate::data::{Profile, Selection, read_reports};
+use crate::data::{self, Profile, Selection, read_reports};
 use crate::fit::{measured_costs, measured_slice, slice_tuning};
 use crate::progress::Progress;
 use crate::report::Label;
 use crate::text::count;
 use crate::train::{Trained, train};
 use crate::write::{is_temporary, write_text};
-use crate::{data, model_card};
+use crate::{Report, model_card};
 use anyhow::{Context, Result, bail};
 use page::Page;
 use rayon::prelude::*;

@@ -32,7 +32,6 @@ pub use core_to_core::core_to_core_ns;
 pub use foreign_load::Watch;
 #[cfg(feature = "gpu")]
 pub use gpu::{gpu, gpu_group};
-#[cfg(feature = "measure")]
 pub(crate) use identity::fnv1a;
 pub use identity::machine;
 

@@ -4,8 +4,7 @@ use super::needed::needed;
 use super::{GroupResidual, MethodModel, PredictError};
 use crate::hardware::{Hardware, ParameterId};
 use sapwise::algorithm::{Backend, BackendClass};
-use sapwise::internals::{Fallback, Work};
-use sapwise::internals::{Places, Residual};
+use sapwise::internals::{Fallback, Places, Residual, Work};
 use sapwise::tuning::{CostCurve, CostTerm};
 use std::sync::Arc;
 

@@ -1,8 +1,7 @@
 mod extrapolation;
 
 use super::*;
-use crate::hardware::GpuParameterId;
-use crate::hardware::ParameterId;
+use crate::hardware::{GpuParameterId, ParameterId};
 use crate::{GpuGroup, GpuHardware, Hardware, Machine, Parameter};
 use sapwise::algorithm::{Backend, Entry, Load};
 use sapwise::internals::GpuIdentity;
