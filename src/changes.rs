@@ -238,19 +238,6 @@ mod tests {
     }
 
     #[test]
-    fn pairs_are_followed_by_ids() {
-        let mut changes = Changes::new();
-        changes.update(&pairs(&[(0, 3), (1, 2)]), &["d", "a", "c", "b"]).unwrap();
-        assert_eq!(changes.begun(), [("a", "c"), ("b", "d")]);
-        // "a" was removed, and "b" took its position.
-        changes.update(&pairs(&[(0, 1), (1, 2)]), &["d", "b", "c"]).unwrap();
-        assert_eq!(changes.begun(), [("b", "c")]);
-        assert_eq!(changes.ended(), [("a", "c")]);
-        assert_eq!(changes.lasting(), 1);
-        assert_eq!(changes.pairs(), [("b", "c"), ("b", "d")]);
-    }
-
-    #[test]
     fn positions_may_be_ids() {
         let mut changes = Changes::new();
         changes.update_positions(&pairs(&[(8, 3), (1, 2)])).unwrap();

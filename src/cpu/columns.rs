@@ -127,22 +127,3 @@ pub(crate) fn order_key(v: f32) -> u32 {
     // Negative floats descend as integers: flip all their bits, and the sign bit of the others.
     if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn order_keys_ascend_with_bounds() {
-        let values = [f32::NEG_INFINITY, -1.0e30, -1.0, -1.0e-40, -0.0, 0.0, 1.0e-40, 1.0, 1.0e30, f32::INFINITY];
-        assert!(values.map(order_key).is_sorted_by(|a, b| a < b));
-    }
-
-    #[test]
-    fn parts_cover_everything_once() {
-        for (len, parts) in [(0, 3), (1, 4), (10, 3), (16, 16)] {
-            let all: Vec<usize> = (0..parts).flat_map(|k| part(len, k, parts)).collect();
-            assert_eq!(all, (0..len).collect::<Vec<_>>());
-        }
-    }
-}

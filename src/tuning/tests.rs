@@ -83,14 +83,6 @@ fn an_interval_has_both_ends_or_none() {
 }
 
 #[test]
-fn an_algorithm_that_never_wins_has_no_step() {
-    let costs = vec![cost("brute@cpu1", &[(Term::Objects, 2.0)], 0.0), cost("sap@cpu1", &[(Term::Objects, 1.0)], 0.0)];
-    let tuning = Tuning::from_costs(Source::Measured, "uniform", costs, &loads());
-    assert_eq!(tuning.steps.len(), 1);
-    assert!(tuning.crossovers.is_empty());
-}
-
-#[test]
 fn cheapest_is_one_of_the_usable() {
     let costs = vec![
         cost("a@cpu1", &[(Term::Call, 3.0)], 0.0),

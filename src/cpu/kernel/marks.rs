@@ -144,29 +144,3 @@ fn union(a: &Membership, b: &Membership) -> Membership {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::mix;
-
-    #[test]
-    fn lanes_are_tested_as_by_the_filter_and_unions_rule_out_no_pair() {
-        let of = |k: u64| {
-            let bits = |a: u64| (mix(4 * k + a) % 8) as u32;
-            Membership { groups: bits(0), mask: bits(1), fixed: bits(2) < 3, owner: bits(3) / 3 }
-        };
-        let filter = Filter::new((0..1600).map(of).collect());
-        for first in (0..1600).step_by(LANES) {
-            let marks = Marks::of(&std::array::from_fn(|k| if k == 5 { NOBODY } else { first + k as u32 }), &filter);
-            let all = (&marks).query_all();
-            for by in (0..200).map(|k| of(10_000 + k)) {
-                let wanted = |k: u32| k != 5 && by.wants(filter.of(first + k));
-                let expected = (0..LANES as u32).fold(0, |mask, k| mask | u32::from(wanted(k)) << k);
-                assert_eq!((&marks).among(0xffff, &by), expected, "{by:?} with {marks:?}");
-                assert_eq!((&marks).among(0x0ff0, &by), expected & 0x0ff0);
-                assert!(expected == 0 || by.wants(&all), "{by:?} with {all:?}");
-            }
-        }
-    }
-}
