@@ -7,8 +7,7 @@ mod space;
 use common::naive;
 use proptest::prelude::*;
 use sapwise::algorithm::{Displacement, Load};
-use sapwise::tuning::Step;
-use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, PairOrder, Pairs, Registry, Space, Tuning};
+use sapwise::{Aabb, Adaptive, AlgorithmId, PairOrder, Pairs, Registry, Space};
 
 /// Bounds that meet often, with infinities, zeros of both signs and denormals among them.
 fn bound() -> impl Strategy<Value = f32> {
@@ -97,24 +96,6 @@ proptest! {
             let (moved, share) = motion.map_or((0.0, 0.0), |m| (m.moved, m.moved_share));
             prop_assert!((0.0..=most).contains(&moved), "{}", moved);
             prop_assert!((0.0..=most.ceil()).contains(&share), "{}", share);
-        }
-    }
-
-    #[test]
-    fn adaptive_is_right_with_any_step(
-        border in 1_u32..400,
-        frames in prop::collection::vec(prop::collection::vec(valid_box(), 0..400), 1..4),
-    ) {
-        let step = |from_objects, id: &str| Step { from_objects, algorithm: id.parse().unwrap() };
-        let tuning = Tuning::from_steps(vec![step(0, "brute@cpu1"), step(border, "grid-sap@cpu1")]).unwrap();
-        let registry = Registry::with_cores(1);
-        let mut adaptive = Adaptive::new(tuning, &registry).unwrap();
-        let mut brute = registry.create(&"brute@cpu1".parse().unwrap()).unwrap();
-        let (mut a, mut b) = (Pairs::new(), Pairs::new());
-        for boxes in frames {
-            adaptive.find_pairs(&boxes, &mut a).unwrap();
-            brute.find_pairs(&boxes, &mut b).unwrap();
-            prop_assert_eq!(a.fingerprint(), b.fingerprint());
         }
     }
 }

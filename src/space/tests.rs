@@ -1,5 +1,5 @@
 use super::*;
-use crate::{BoxDefect, Ray};
+use crate::Ray;
 
 #[test]
 fn bodies_that_are_not_set_rest_and_wake() {
@@ -124,74 +124,32 @@ fn bodies_stay_active_longer_the_more_often_they_are_set() {
 }
 
 #[test]
-fn call_that_fails_changes_nothing() {
+fn slot_is_used_again_and_its_handle_is_not() {
     let mut space = Space::new();
     let unit = Aabb::cube([0.0; 3], 1.0);
-    let one = space.insert(unit, Body::default()).unwrap();
     let gone = space.insert(unit, Body::default()).unwrap();
-    space.update().unwrap();
     space.remove(gone).unwrap();
-    let stale = Err(Error::StaleHandle { handle: gone });
-    let nan = Aabb::new([f32::NAN; 3], [1.0; 3]);
-    let inverted = Aabb::new([2.0; 3], [1.0; 3]);
-    let other = Aabb::cube([9.0; 3], 1.0);
-    for _ in 0..2 {
-        assert_eq!(space.set(gone, unit), stale);
-        assert_eq!(space.set_body(gone, Body::fixed()), stale);
-        assert_eq!(space.remove(gone), stale);
-        assert_eq!(space.set_all(&[one, gone], &[other; 2]), stale);
-        assert_eq!(space.remove_all(&[one, gone]), stale);
-        assert!(!space.contains(gone) && space.get(gone).is_none());
-        let defect = BoxDefect::NotANumber;
-        assert_eq!(space.set(one, nan), Err(Error::InvalidBody { handle: one, defect }));
-        assert_eq!(space.insert_all(&[unit, nan], Body::fixed()), Err(Error::InvalidBox { index: 1, defect }));
-        let defect = BoxDefect::Inverted;
-        assert_eq!(space.set_all(&[one, one], &[other, inverted]), Err(Error::InvalidBody { handle: one, defect }));
-        assert_eq!(space.insert(inverted, Body::fixed()), Err(Error::InvalidBox { index: 0, defect }));
-        assert_eq!((space.len(), space.get(one)), (1, Some((&unit, &Body::default()))));
-        space.update().unwrap();
-    }
-    // The slot is used again, the handle is not.
+    space.update().unwrap();
     let again = space.insert(unit, Body::default()).unwrap();
     assert!(again != gone && again.slot() == gone.slot());
-    assert_eq!(space.set(gone, unit), stale);
+    assert_eq!(space.set(gone, unit), Err(Error::StaleHandle { handle: gone }));
     assert_eq!(Handle::from_bits(again.to_bits()), Some(again));
     assert_eq!((Handle::from_bits(0), size_of::<Option<Handle>>()), (None, 8));
-    let foreign = Handle::from_bits(u64::MAX).unwrap();
-    assert_eq!(space.remove(foreign), Err(Error::StaleHandle { handle: foreign }));
 }
 
 #[test]
-fn queries_leave_out_what_was_removed_since_and_report_bad_input() {
+fn rays_need_a_direction_and_boxes_no_motion() {
     let mut space = Space::new();
-    let handles = space.insert_all(&[Aabb::cube([0.0; 3], 1.0), Aabb::cube([1.0; 3], 1.0)], Body::default()).unwrap();
+    space.insert(Aabb::cube([9.0; 3], 1.0), Body::default()).unwrap();
     space.update().unwrap();
-    let at = |space: &Space| {
-        let mut found = Vec::new();
-        space.all().query_point([0.5; 3], |handle| found.push(handle)).unwrap();
-        found
-    };
-    assert_eq!(at(&space), handles);
-    space.remove(handles[0]).unwrap();
-    // Where it was at the last update.
-    space.set(handles[1], Aabb::cube([9.0; 3], 1.0)).unwrap();
-    assert_eq!(at(&space), handles[1..]);
-    space.update().unwrap();
-    assert_eq!(at(&space), []);
-    let nan = [f32::NAN, 0.0, 0.0];
-    assert!(matches!(space.all().nearest(nan, 1), Err(Error::InvalidRay { .. })));
-    assert!(matches!(space.all().query_point(nan, drop), Err(Error::InvalidBox { index: 0, .. })));
     assert!(matches!(space.all().first_hit(&Ray::new([0.0; 3], [0.0; 3])), Err(Error::InvalidRay { .. })));
-    let unit = Aabb::cube([9.0; 3], 0.5);
-    assert!(matches!(space.all().cast_box(&unit, nan, |_, t| t), Err(Error::InvalidRay { .. })));
     let mut met = 0;
     let count = |_, t| {
         met += 1;
         t
     };
-    space.all().cast_box(&unit, [0.0; 3], count).unwrap();
+    space.all().cast_box(&Aabb::cube([9.0; 3], 0.5), [0.0; 3], count).unwrap();
     assert_eq!(met, 1);
-    assert_eq!(Space::new().all().nearest([0.0; 3], 3), Ok(vec![]));
 }
 
 #[test]
@@ -208,20 +166,6 @@ fn clones_see_resting_bodies_at_the_last_update() {
         assert_eq!(space.all().nearest([7.0, 0.0, 0.0], 1), Ok(vec![(handles[7], 0.0)]));
         assert_eq!(space.all().nearest([300.0, 0.0, 0.0], 1).unwrap()[0].0, handles[99]);
     }
-}
-
-/// The active bodies are not in the order of their handles.
-#[test]
-fn lowest_handle_is_the_nearest_of_equals() {
-    let mut space = Space::new();
-    let unit = Aabb::cube([0.0; 3], 1.0);
-    let handles = space.insert_all(&[unit; 9], Body::default()).unwrap();
-    space.update().unwrap();
-    space.remove(handles[0]).unwrap();
-    space.update().unwrap();
-    assert_eq!(space.all().nearest([5.0, 0.0, 0.0], 1), Ok(vec![(handles[1], 4.0)]));
-    let ray = Ray::new([5.0, 0.0, 0.0], [-1.0, 0.0, 0.0]);
-    assert_eq!(space.all().first_hit(&ray), Ok(Some((handles[1], 4.0))));
 }
 
 #[test]
@@ -241,21 +185,4 @@ fn threads_may_query_at_once() {
             });
         }
     });
-}
-
-#[test]
-fn slot_of_a_removed_body_is_freed_once_after_a_failed_update() {
-    let mut space = Space::new();
-    let at = |x: f32| Aabb::cube([x, 0.0, 0.0], 1.0);
-    let [a, _, c] = [0.0, 0.5, 9.0].map(|x| space.insert(at(x), Body::default()).unwrap());
-    space.update().unwrap();
-    space.remove(c).unwrap();
-    space.set_limit(Some(0));
-    assert_eq!(space.update(), Err(Error::TooManyPairs { limit: 0 }));
-    space.set_limit(None);
-    space.set(a, at(0.1)).unwrap();
-    space.update().unwrap();
-    let [x, y] = [20.0, 20.5].map(|x| space.insert(at(x), Body::default()).unwrap());
-    space.update().unwrap();
-    assert_eq!((x != y, space.len(), space.begun()), (true, 4, &[(x.min(y), x.max(y))][..]));
 }
