@@ -55,18 +55,6 @@ impl Load {
         Self { objects, ..Self::default() }
     }
 
-    /// Returns whether a frame of another load takes about as long. Each count may differ by `share` of itself plus
-    /// `share` of the objects, because a box takes as long as some pairs; the share of moved boxes by `share` of all.
-    pub fn is_within(&self, share: f64, other: &Self) -> bool {
-        let objects = f64::from(self.objects);
-        let counts = |l: &Self| [f64::from(l.objects), l.axis_candidates, l.strip_candidates, l.pairs];
-        // False for NaN.
-        let near = |(a, b): (f64, f64)| (a - b).abs() <= share * (a + objects);
-        counts(self).into_iter().zip(counts(other)).all(near)
-            && (self.moved - other.moved).abs() <= share * self.moved
-            && (self.moved_share - other.moved_share).abs() <= share
-    }
-
     /// Returns the load with this many overlapping pairs.
     #[must_use]
     pub fn with_pairs(self, pairs: f64) -> Self {
