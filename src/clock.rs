@@ -39,14 +39,10 @@ pub(crate) fn elapsed_ns(since: Instant) -> f64 {
     since.elapsed().as_nanos() as u64 as f64
 }
 
-/// Returns whether the clock is fine enough to tell this time.
-fn tells(ns: f64) -> bool {
-    tick().is_some_and(|tick| ns >= (FEWEST_TICKS * tick).as_nanos() as f64)
-}
-
 /// Returns the nanoseconds since then, at least 1; `None` if the clock is too coarse to tell.
 pub(crate) fn measured_ns(since: Instant) -> Option<f64> {
-    Some(elapsed_ns(since)).filter(|&ns| tells(ns)).map(|ns| ns.max(1.0))
+    let (ns, tick) = (elapsed_ns(since), tick()?);
+    (ns >= (FEWEST_TICKS * tick).as_nanos() as f64).then_some(ns.max(1.0))
 }
 
 /// Replaces the standard library's clock, which traps in WebAssembly without a system. A crate that asks a browser

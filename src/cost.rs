@@ -232,7 +232,7 @@ mod tests {
         let mut with = curve.clone();
         with.work_mut().residual = Some(residual.clone());
         assert!((with.cost_ns(&load(16)) / curve.cost_ns(&load(16)) - 2.0).abs() < 1e-9);
-        with.residual = Some(residual.with_constant(3.0_f64.ln()));
+        with.residual = Some(Residual { constant: 3.0_f64.ln(), ..residual });
         assert!((with.cost_ns(&load(16)) / curve.cost_ns(&load(16)) - 12.0).abs() < 1e-9);
         assert_eq!(with.defect(), None);
     }
@@ -251,7 +251,7 @@ mod tests {
     #[test]
     fn helpers_divide_work_but_not_calls() {
         let one = CostCurve::new(vec![CostTerm::new(Term::Call, 50.0), CostTerm::new(Term::Objects, 10.0)]);
-        let two = CostCurve { helpers: Some(Helpers::new(2).with_call(1000.0, 0.0)), ..one.clone() };
+        let two = CostCurve { helpers: Some(Helpers { call_ns: 1000.0, ..Helpers::new(2) }), ..one.clone() };
         assert_eq!((one.cost_ns(&load(1000)), two.cost_ns(&load(1000))), (10_050.0, 6025.0));
         // Both share one work, which is computed once.
         assert!(Arc::ptr_eq(&one.work, &two.work));

@@ -111,14 +111,6 @@ impl Registry {
         self.entries.iter().position(|e| e.id == *id)
     }
 
-    /// Returns the maker of an algorithm that a user added; `None` if it is built in or a source's.
-    fn users_maker(&self, id: &AlgorithmId) -> Option<&Factory> {
-        match &self.makers[self.position(id)?] {
-            Maker::User(make) => Some(make),
-            _ => None,
-        }
-    }
-
     /// Adds the algorithms of a source, except those whose ids are listed already. It replaces an earlier source of
     /// the same type.
     pub fn add_source<S: AlgorithmSource>(&mut self, source: S) {
@@ -269,7 +261,7 @@ impl Registry {
     /// [`Error::UnknownAlgorithm`]. [`Error::Unavailable`], for example if a file from a larger machine names more
     /// threads than this one has cores.
     pub fn create(&self, id: &AlgorithmId) -> Result<Box<dyn BroadPhase>, Error> {
-        if let Some(make) = self.users_maker(id) {
+        if let Some(Maker::User(make)) = self.position(id).map(|at| &self.makers[at]) {
             return make();
         }
         if let Some(method) = built_in(id) {

@@ -94,15 +94,11 @@ impl Worlds {
 
 /// Returns an error for the first start that is not as [`Worlds::find_pairs`] wants it.
 fn check_starts(starts: &[usize], boxes: usize) -> Result<(), Error> {
-    let mut last = 0;
-    for (index, &start) in starts.iter().enumerate() {
-        if start < last || index == 0 && start != 0 {
-            return Err(Error::InvalidStarts { index, start, boxes });
-        }
-        last = start;
-    }
-    let index = starts.len().saturating_sub(1);
-    if last == boxes { Ok(()) } else { Err(Error::InvalidStarts { index, start: last, boxes }) }
+    let start = |index: usize| starts.get(index).copied().unwrap_or_default();
+    let last = starts.len().saturating_sub(1);
+    let is_wrong =
+        |&k: &usize| start(k) < start(k.saturating_sub(1)) || k == 0 && start(k) != 0 || k == last && start(k) != boxes;
+    (0..=last).find(is_wrong).map_or(Ok(()), |index| Err(Error::InvalidStarts { index, start: start(index), boxes }))
 }
 
 /// Runs one phase: fills each list with the pairs of a part of the worlds, all with about as many boxes, and writes the

@@ -27,12 +27,6 @@ impl Helpers {
         Self { threads, call_ns: 0.0, late_ns: 0.0, speed_up: f64::from(threads), boxes_per_thread: 0 }
     }
 
-    /// Sets the time to call all of them, and the work of one thread that is lost while they wake.
-    #[must_use]
-    pub fn with_call(self, call_ns: f64, late_ns: f64) -> Self {
-        Self { call_ns, late_ns, ..self }
-    }
-
     /// Returns the nanoseconds of a frame of `objects` boxes that takes `work_ns` on one thread.
     pub fn cost_ns(&self, objects: u32, work_ns: f64) -> f64 {
         let Some(share) = self.share(objects) else { return work_ns };
@@ -64,7 +58,7 @@ mod tests {
 
     #[test]
     fn a_late_helper_costs_its_call_and_an_early_one_saves_its_share() {
-        let two = Helpers { speed_up: 1.8, ..Helpers::new(2).with_call(100.0, 5000.0) };
+        let two = Helpers { call_ns: 100.0, late_ns: 5000.0, speed_up: 1.8, ..Helpers::new(2) };
         // (1000 + 5000) / 1.8 is more than 1000: the caller is done first.
         assert_eq!(two.cost_ns(10, 1000.0), 1100.0);
         assert_eq!(two.cost_ns(10, 85_000.0), 50_100.0);
@@ -72,7 +66,7 @@ mod tests {
 
     #[test]
     fn a_frame_calls_as_many_as_its_boxes_keep_busy() {
-        let five = Helpers { boxes_per_thread: 1024, ..Helpers::new(5).with_call(400.0, 0.0) };
+        let five = Helpers { boxes_per_thread: 1024, call_ns: 400.0, ..Helpers::new(5) };
         assert_eq!(five.cost_ns(2047, 6000.0), 6000.0);
         assert_eq!(five.cost_ns(2048, 6000.0), 3100.0);
         assert_eq!(five.cost_ns(1_000_000, 6000.0), 1600.0);
@@ -82,6 +76,6 @@ mod tests {
     fn impossible_values_are_refused() {
         assert!(Helpers::new(2).is_sound() && !Helpers::new(1).is_sound());
         assert!(!Helpers { speed_up: 0.0, ..Helpers::new(2) }.is_sound());
-        assert!(!Helpers::new(2).with_call(f64::NAN, 0.0).is_sound());
+        assert!(!Helpers { call_ns: f64::NAN, ..Helpers::new(2) }.is_sound());
     }
 }

@@ -142,12 +142,6 @@ impl Residual {
         Self { places, constant: 0.0, weights, by_motion }
     }
 
-    /// Sets the natural logarithm of a factor that holds everywhere.
-    #[must_use]
-    pub fn with_constant(self, constant: f64) -> Self {
-        Self { constant, ..self }
-    }
-
     /// Returns the natural logarithm of the factor on the cost under a load.
     pub fn ln(&self, load: &Load) -> f64 {
         self.ln_of(&self.places.likeness_of(load))

@@ -122,7 +122,7 @@ mod tests {
         let (mut costs, loads) = drawn(seed);
         let others: Vec<_> = costs.iter().map(|c| Arc::clone(&c.curve.work)).collect();
         for (k, cost) in costs.iter_mut().enumerate() {
-            let helpers = Helpers { boxes_per_thread: 1024, ..Helpers::new(4).with_call(2000.0, 20_000.0) };
+            let helpers = Helpers { call_ns: 2000.0, late_ns: 20_000.0, boxes_per_thread: 1024, ..Helpers::new(4) };
             cost.curve.helpers = (k % 2 == 1).then_some(helpers);
             if let Some(residual) = &mut cost.curve.residual {
                 // Around zero, as a fit leaves them: all above it, they would be a factor of their own.
