@@ -32,7 +32,6 @@ static PREDICTED: LazyLock<Tuning> = LazyLock::new(|| {
 ///
 /// # Panics
 /// The report in the tests is damaged.
-#[must_use]
 pub fn hardware() -> Hardware {
     sapwise_lab::report::read(include_str!("../../crates/lab/tests/fixtures/report-3.json")).unwrap().value.hardware
 }
@@ -46,7 +45,6 @@ impl Checked {
     ///
     /// # Panics
     /// An available algorithm can't be made.
-    #[must_use]
     pub fn of(source: &mut Source<'_>) -> Self {
         let registry = &REGISTRIES[usize::from(source.byte()) % REGISTRIES.len()];
         let kind = source.byte();

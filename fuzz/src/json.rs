@@ -4,7 +4,6 @@ use crate::source::Random;
 use serde_json::{Value, json};
 
 /// Returns the text with one to four damages; `None` if it is no JSON.
-#[must_use]
 pub fn damaged(text: &[u8], seed: u32) -> Option<String> {
     let mut whole: Value = serde_json::from_slice(text).ok()?;
     let mut random = Random::new(seed);

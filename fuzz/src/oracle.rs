@@ -15,7 +15,6 @@ pub struct Answer {
 }
 
 /// Returns the answer for these boxes with a filter and a limit.
-#[must_use]
 pub fn answer(boxes: &[Aabb], memberships: Option<&[Membership]>, limit: Option<usize>) -> Answer {
     if let Some((index, defect)) = boxes.iter().enumerate().find_map(|(k, b)| Some((k, defect(b)?))) {
         return Answer { pairs: Err(Error::InvalidBox { index, defect }), overlapping: 0 };
@@ -57,7 +56,6 @@ fn defect(b: &Aabb) -> Option<BoxDefect> {
 }
 
 /// Returns the pairs of two ids that these pairs of positions stand for, each once.
-#[must_use]
 pub fn of_ids(pairs: &[Pair], ids: &[u8]) -> BTreeSet<(u8, u8)> {
     let named = pairs.iter().map(|&(i, j)| (ids[i as usize], ids[j as usize]));
     named.filter(|(a, b)| a != b).map(|(a, b)| (a.min(b), a.max(b))).collect()

@@ -37,13 +37,11 @@ pub struct Scene {
 
 impl Scene {
     /// Returns the boxes of the present frame.
-    #[must_use]
     pub fn boxes(&self) -> &[Aabb] {
         &self.boxes
     }
 
     /// Returns an empty list with the order, limit and filter.
-    #[must_use]
     pub fn room(&self) -> Pairs {
         let mut pairs = Pairs::with_order(if self.canonical { PairOrder::Canonical } else { PairOrder::Any });
         pairs.set_limit(self.limit);

@@ -6,13 +6,11 @@ pub struct Source<'a>(&'a [u8]);
 
 impl<'a> Source<'a> {
     /// Starts at the first byte.
-    #[must_use]
     pub fn new(bytes: &'a [u8]) -> Self {
         Self(bytes)
     }
 
     /// Returns whether all bytes are consumed.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
@@ -47,7 +45,6 @@ pub struct Random(u64);
 
 impl Random {
     /// Makes the generator of a seed.
-    #[must_use]
     pub fn new(seed: u32) -> Self {
         Self((u64::from(seed) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15))
     }

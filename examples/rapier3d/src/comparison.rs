@@ -154,13 +154,11 @@ impl Comparison {
     }
 
     /// Returns the colliders' own boxes in this step, in the order of rapier's set of colliders.
-    #[must_use]
     pub fn boxes(&self, physics: &PhysicsWorld) -> Vec<Aabb> {
         physics.colliders.iter().filter_map(|(collider, _)| self.own.aabb(collider).copied()).collect()
     }
 
     /// Returns what was decided for the space of own boxes.
-    #[must_use]
     pub fn last_decision(&self) -> Option<Decision<'_>> {
         self.own.space.search().last_decision()
     }

@@ -68,7 +68,6 @@ struct Cube {
 
 impl World {
     /// An empty pit; the first step drops cubes into it.
-    #[must_use]
     pub fn new(settings: Settings) -> Self {
         let mut physics = PhysicsWorld::new();
         let slab = |x: f32, y: f32, z: f32| ColliderBuilder::cuboid(x, y, z).restitution(0.2);
@@ -87,13 +86,11 @@ impl World {
     }
 
     /// What rapier knows.
-    #[must_use]
     pub fn physics(&self) -> &PhysicsWorld {
         &self.physics
     }
 
     /// Bodies that move.
-    #[must_use]
     pub fn bodies(&self) -> usize {
         self.cubes.len()
     }
