@@ -71,7 +71,6 @@ mod space;
 pub mod splitmix;
 #[doc(hidden)]
 pub mod stats;
-mod triad;
 pub mod tuning;
 mod worlds;
 

@@ -14,6 +14,7 @@ pub(crate) mod node;
 pub(crate) mod ray;
 pub(crate) mod rows;
 pub(crate) mod small;
+pub(crate) mod triad;
 pub(crate) mod walk;
 #[cfg(target_arch = "x86_64")]
 mod x86;

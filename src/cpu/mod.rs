@@ -24,6 +24,7 @@ mod world;
 
 #[cfg(feature = "parallel")]
 pub use helpers::pinned_pool;
+pub use kernel::triad::triad;
 pub use level::{SimdLevel, SimdLevelError};
 pub use threads::Threads;
 pub use tree::Tree;
