@@ -192,7 +192,7 @@ impl Space {
 
     /// Returns the number of bodies.
     pub fn len(&self) -> usize {
-        self.slots.len()
+        self.slots.len
     }
 
     /// Returns whether there is no body.
@@ -302,7 +302,7 @@ impl Space {
     /// Returns the box and the body of a handle, as set last; `None` if it is stale.
     pub fn get(&self, handle: Handle) -> Option<(&Aabb, &Body)> {
         let slot = self.slots.find(handle).ok()?;
-        Some((&self.slots.boxes()[slot as usize], self.slots.body(slot)))
+        Some((&self.slots.boxes[slot as usize], self.slots.body(slot)))
     }
 
     /// Iterates over the handles of all bodies, ascending.

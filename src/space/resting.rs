@@ -85,7 +85,7 @@ impl Resting {
 
     /// Puts the arrivals into the tree.
     pub(super) fn update(&mut self, slots: &Slots) -> Result<(), Error> {
-        let boxes = slots.boxes();
+        let boxes = &slots.boxes[..];
         let worn = self.wear.excess() > SORT_IN_NODES * self.len() as u64;
         self.arrived.clear();
         if self.arrivals.is_empty() && !worn && self.is_built || self.len() == 0 {

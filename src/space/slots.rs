@@ -37,7 +37,8 @@ struct Slot {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Slots {
     slots: Vec<Slot>,
-    boxes: Vec<Aabb>,
+    /// By slot. Those of free slots are unspecified.
+    pub(super) boxes: Vec<Aabb>,
     bodies: Vec<Body>,
     /// Slots without a body. The last one is used first.
     pub(super) free: Vec<u32>,
@@ -48,14 +49,10 @@ pub(super) struct Slots {
     /// The boxes that the resting bodies which were set since had at the last update.
     replaced: Vec<(u32, Aabb)>,
     /// Number of bodies.
-    len: usize,
+    pub(super) len: usize,
 }
 
 impl Slots {
-    pub(super) fn len(&self) -> usize {
-        self.len
-    }
-
     pub(super) fn reserve(&mut self, more: usize) -> Result<(), Error> {
         let room = more.saturating_sub(self.free.len());
         let most = self.boxes.len().saturating_add(room);
@@ -79,11 +76,6 @@ impl Slots {
     #[inline]
     pub(super) fn handle(&self, slot: u32) -> Handle {
         Handle::new(slot, self.slots[slot as usize].generation)
-    }
-
-    /// Returns all boxes by slot. Those of free slots are unspecified.
-    pub(super) fn boxes(&self) -> &[Aabb] {
-        &self.boxes
     }
 
     pub(super) fn body(&self, slot: u32) -> &Body {

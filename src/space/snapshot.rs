@@ -61,7 +61,7 @@ impl Snapshot {
         let (now, mut previous) = (&space.slots, space.slots.clone());
         previous.exchange_replaced();
         let held = |slot: u32| {
-            let known = previous.boxes()[slot as usize];
+            let known = previous.boxes[slot as usize];
             let (stage, known) = match now.at(slot) {
                 At::Free => return None,
                 At::New => (Stage::New, None),
@@ -72,7 +72,7 @@ impl Snapshot {
                 At::Resting => (Stage::Resting, Some(known)),
             };
             Some(Held {
-                aabb: now.boxes()[slot as usize],
+                aabb: now.boxes[slot as usize],
                 body: *now.body(slot),
                 stage,
                 previous: known.filter(|_| now.is_changed(slot)),
@@ -82,7 +82,7 @@ impl Snapshot {
         let slot = |slot| Slot { generation: now.handle(slot).generation(), held: held(slot) };
         let resting = space.pairs[..links.len()].iter().map(|(a, b)| (a.slot(), b.slot()));
         Self {
-            slots: (0..now.boxes().len() as u32).map(slot).collect(),
+            slots: (0..now.boxes.len() as u32).map(slot).collect(),
             free: now.free.clone(),
             pairs: resting.chain(before.iter().copied().map(slots)).collect(),
             begun: space.begun.clone(),

@@ -99,7 +99,7 @@ impl Space {
             let at = self.slots.at(slot);
             match at {
                 At::Active(at) if !removed => {
-                    self.active.set(at as usize, self.slots.boxes()[slot as usize], self.update);
+                    self.active.set(at as usize, self.slots.boxes[slot as usize], self.update);
                     if done & SET_BODY != 0 {
                         self.active.set_body(at as usize, self.slots.body(slot));
                         self.neighbours.forget(at as usize);
@@ -136,7 +136,7 @@ impl Space {
     pub(super) fn activate(&mut self, slot: u32, patience: Patience, place: Option<u32>) {
         let at = place.unwrap_or(self.active.len() as u32);
         self.slots.set_at(slot, At::Active(at));
-        let (aabb, body) = (self.slots.boxes()[slot as usize], self.slots.body(slot));
+        let (aabb, body) = (self.slots.boxes[slot as usize], self.slots.body(slot));
         self.active.put(at as usize, slot, aabb, body, patience);
     }
 
@@ -157,7 +157,7 @@ impl Space {
     /// Lets no body rest any more.
     fn wake_all(&mut self) {
         self.rests = false;
-        for slot in 0..self.slots.boxes().len() as u32 {
+        for slot in 0..self.slots.boxes.len() as u32 {
             if self.slots.at(slot) == At::Resting {
                 self.activate(slot, Patience::after(self.update, IDLE), None);
             }
@@ -179,7 +179,7 @@ impl Space {
         if resting.len() > 0 {
             let wants = |at: usize, other| slots.body(of[at]).membership().wants(slots.body(other).membership());
             let found = |at: usize, other| keys.push(key(of[at], other));
-            neighbours.each(resting, slots.boxes(), (of, &active.boxes), wants, found);
+            neighbours.each(resting, &slots.boxes, (of, &active.boxes), wants, found);
         }
         sorter.sort(&Workers::one(), keys);
         Ok(())
