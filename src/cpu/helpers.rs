@@ -18,8 +18,9 @@ pub(crate) struct Helpers {
     pinned: bool,
     /// Nothing before the start.
     team: OnceLock<Team>,
+    /// Whether to do as if the system refused them.
     #[cfg(test)]
-    refused: std::sync::atomic::AtomicBool,
+    pub(crate) refused: std::sync::atomic::AtomicBool,
 }
 
 /// A pool of helpers that runs.
@@ -105,12 +106,6 @@ impl Helpers {
     #[cfg(test)]
     pub(crate) fn coming(&self) -> usize {
         self.team().unwrap().shared.phases.coming()
-    }
-
-    /// Does from now on as if the system refused them, or no more.
-    #[cfg(test)]
-    pub(crate) fn refuse(&self, refused: bool) {
-        self.refused.store(refused, std::sync::atomic::Ordering::Relaxed);
     }
 }
 

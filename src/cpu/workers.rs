@@ -13,12 +13,11 @@ use std::sync::{Mutex, PoisonError};
 /// The threads of one algorithm: the calling one, and its helpers from a pool.
 #[derive(Debug)]
 pub struct Workers {
-    #[cfg(feature = "parallel")]
-    method: &'static str,
     threads: usize,
     tasks: usize,
+    /// With the method that has them.
     #[cfg(feature = "parallel")]
-    helpers: Option<Arc<Helpers>>,
+    helpers: Option<(&'static str, Arc<Helpers>)>,
 }
 
 /// A frame in progress. Dropping it sends the helpers away.
@@ -57,20 +56,16 @@ impl Workers {
         #[cfg(not(feature = "parallel"))]
         let _ = (method, pools);
         Self {
-            #[cfg(feature = "parallel")]
-            method,
             threads: threads as usize,
             tasks: if threads == 1 { 1 } else { threads as usize * TASKS_PER_THREAD },
             #[cfg(feature = "parallel")]
-            helpers: (threads > 1).then(|| pools.helpers(threads - 1)),
+            helpers: (threads > 1).then(|| (method, pools.helpers(threads - 1))),
         }
     }
 
     /// Returns the calling thread alone.
     pub fn one() -> Self {
         Self {
-            #[cfg(feature = "parallel")]
-            method: "",
             threads: 1,
             tasks: 1,
             #[cfg(feature = "parallel")]
@@ -99,12 +94,10 @@ impl Workers {
     pub fn at_most(&self, threads: usize) -> Self {
         let threads = self.threads.min(threads);
         Self {
-            #[cfg(feature = "parallel")]
-            method: self.method,
             threads,
             tasks: if threads == 1 { 1 } else { (threads * TASKS_PER_THREAD).min(self.tasks) },
             #[cfg(feature = "parallel")]
-            helpers: self.helpers.as_ref().filter(|_| threads > 1).map(Arc::clone),
+            helpers: self.helpers.clone().filter(|_| threads > 1),
         }
     }
 
@@ -114,8 +107,8 @@ impl Workers {
     /// [`Error::Unavailable`] if the system refuses the threads.
     pub fn start(&self) -> Result<(), Error> {
         #[cfg(feature = "parallel")]
-        if let Some(helpers) = &self.helpers {
-            let algorithm = || AlgorithmId::cpu(self.method, helpers.count + 1);
+        if let Some((method, helpers)) = &self.helpers {
+            let algorithm = || AlgorithmId::cpu(method, helpers.count + 1);
             helpers.start().map_err(|reason| Error::Unavailable { algorithm: algorithm(), reason })?;
         }
         Ok(())
@@ -128,12 +121,12 @@ impl Workers {
     pub fn frame(&self) -> Result<Frame, Error> {
         self.start()?;
         #[cfg(feature = "parallel")]
-        if let Some(helpers) = &self.helpers {
+        if let Some((_, helpers)) = &self.helpers {
             helpers.begin_frame(self.threads - 1);
         }
         Ok(Frame {
             #[cfg(feature = "parallel")]
-            helpers: self.helpers.as_ref().map(Arc::clone),
+            helpers: self.helpers.as_ref().map(|(_, helpers)| Arc::clone(helpers)),
         })
     }
 
@@ -143,7 +136,7 @@ impl Workers {
     pub fn each_of<I: Iterator<Item: Send> + Send>(&self, tasks: I, work: impl Fn(I::Item) + Sync) {
         #[cfg(feature = "parallel")]
         // A single task needs no help.
-        if let (Some(helpers), most @ 2..) = (&self.helpers, tasks.size_hint().1.unwrap_or(usize::MAX)) {
+        if let (Some((_, helpers)), most @ 2..) = (&self.helpers, tasks.size_hint().1.unwrap_or(usize::MAX)) {
             let queue = Mutex::new(tasks);
             let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).next();
             return helpers.run((self.threads - 1).min(most - 1), &|| std::iter::from_fn(next).for_each(&work));

@@ -75,6 +75,7 @@ fn unknown_algorithm_error_lists_the_known_ones() {
 #[test]
 #[cfg(feature = "parallel")]
 fn refused_threads_are_an_error_of_the_frame() {
+    use std::sync::atomic::Ordering::Relaxed;
     let registry = Registry::with_cores(3);
     let boxes: Vec<Aabb> = (0..5000).map(|k| Aabb::cube([k as f32, 0.0, 0.0], 0.5)).collect();
     let step = |from_objects, id: &str| crate::tuning::Step { from_objects, algorithm: id.parse().unwrap() };
@@ -83,7 +84,7 @@ fn refused_threads_are_an_error_of_the_frame() {
     let ids = cpu::METHODS.iter().map(|method| AlgorithmId::cpu(method.name, 3));
     let made: Vec<_> = ids.map(|id| (registry.create(&id).unwrap(), id)).collect();
     let mut pairs = Pairs::new();
-    registry.threads.helpers(2).refuse(true);
+    registry.threads.helpers(2).refused.store(true, Relaxed);
     for (mut algorithm, id) in made {
         let Err(Error::Unavailable { algorithm, reason }) = algorithm.find_pairs(&boxes, &mut pairs) else {
             panic!("{id} ran on refused threads")
@@ -97,7 +98,7 @@ fn refused_threads_are_an_error_of_the_frame() {
     };
     assert_eq!(ran(&mut adaptive), "pair-cache@cpu1");
     // The system is asked anew in each frame.
-    registry.threads.helpers(2).refuse(false);
+    registry.threads.helpers(2).refused.store(false, Relaxed);
     adaptive.revive(&registry).unwrap();
     assert_eq!(ran(&mut adaptive), "pair-cache@cpu3");
 }
