@@ -1,6 +1,6 @@
 //! The pairs between two lists of boxes.
 
-use crate::cpu::{Columns, Group, LANES, Members, Outputs, Simd, Tree, Workers, brute_rows, part};
+use crate::cpu::{Columns, Group, Input, LANES, Members, Outputs, Simd, Tree, Workers, brute_rows, part};
 use crate::{Aabb, Error, Pairs, Registry, SceneStats, check_count};
 
 /// Most boxes of the shorter list without a tree: they are compared with each box of the longer list that overlaps
@@ -88,7 +88,8 @@ impl Between {
                 })
             })?;
         } else {
-            tree.build(workers, a, Members::From(0), &SceneStats::of(a), pairs.screen())?;
+            let input = Input { workers, boxes: a, screen: pairs.screen() };
+            tree.build(input, Members::From(0), &SceneStats::of(a))?;
             tree.sort_others(workers, b).map_err(of_b)?;
             let sorted = tree.others();
             outputs.find(workers, pairs, |k, parts, list| {

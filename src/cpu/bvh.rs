@@ -63,7 +63,7 @@ mod tests {
                 upkeep.update(&mut tree, input, &FramePlan::default()).unwrap();
                 scene.advance();
             });
-            upkeep.builds()
+            upkeep.builds
         };
         let counts = [Scenario::StaticWorld, Scenario::Uniform, Scenario::Teleport, Scenario::Fast].map(builds);
         assert!(counts.is_sorted() && counts[0] < 10 && counts[1] < 40 && counts[3] > 20, "{counts:?}");

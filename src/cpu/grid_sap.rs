@@ -119,7 +119,7 @@ impl BroadPhase for GridSap {
         let tree = if apart.is_empty() {
             None
         } else {
-            tree.build(workers, boxes, Members::Of(apart), &SceneStats::of_members(boxes, apart), input.screen)?;
+            tree.build(input, Members::Of(apart), &SceneStats::of_members(boxes, apart))?;
             Some(&*tree)
         };
         let (bins, strips, count) = (&*bins, grid.strips(), tasks.len());

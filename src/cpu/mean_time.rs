@@ -5,24 +5,14 @@
 const FRAMES: f64 = 8.0;
 const MOST_RISE: f64 = 2.0;
 
-/// See the module.
+/// The mean; `None` without a frame.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct MeanTime(Option<f64>);
+pub(crate) struct MeanTime(pub(crate) Option<f64>);
 
 impl MeanTime {
-    /// Starts with the time of a frame.
-    pub(crate) fn of(now: f64) -> Self {
-        Self(Some(now))
-    }
-
     /// Adds the time of a frame.
     pub(crate) fn add(&mut self, now: f64) {
         self.0 = Some(self.0.map_or(now, |mean| mean + (now.min(MOST_RISE * mean) - mean) / FRAMES));
-    }
-
-    /// Returns the mean, `None` without a frame.
-    pub(crate) fn get(&self) -> Option<f64> {
-        self.0
     }
 }
 
@@ -33,12 +23,12 @@ mod tests {
     #[test]
     fn mean_follows_a_change_and_hardly_an_interruption() {
         let mut mean = MeanTime::default();
-        assert_eq!(mean.get(), None);
+        assert_eq!(mean.0, None);
         mean.add(8.0);
-        assert_eq!(mean.get(), Some(8.0));
+        assert_eq!(mean.0, Some(8.0));
         mean.add(1.0e9);
-        assert_eq!(mean.get(), Some(9.0));
+        assert_eq!(mean.0, Some(9.0));
         (0..100).for_each(|_| mean.add(2.0));
-        assert!((mean.get().unwrap() - 2.0).abs() < 0.01);
+        assert!((mean.0.unwrap() - 2.0).abs() < 0.01);
     }
 }

@@ -17,18 +17,12 @@ mod sift;
 mod tree;
 mod width;
 
-use crate::aabb::Aabb;
-use crate::broad_phase::{BroadPhase, FrameKind, FrameWork, check_count};
+use crate::broad_phase::{FrameKind, FrameWork};
 use crate::clock::{Instant, measured_ns};
-use crate::cpu::level::Simd;
-use crate::cpu::outputs::Outputs;
-use crate::cpu::tree::{FAR, Members, Upkeep};
-use crate::cpu::workers::Workers;
-use crate::cpu::{Made, Threads};
-use crate::error::Error;
-use crate::load::{FramePlan, SceneStats};
-use crate::pairs::Pairs;
+use crate::cpu::tree::FAR;
+use crate::cpu::{Input, Made, Members, Outputs, Simd, Threads, Upkeep, Workers};
 use crate::registry::thread_counts;
+use crate::{Aabb, BroadPhase, Error, FramePlan, Pairs, SceneStats, check_count};
 use budget::Budget;
 use grown::{Grown, Margin, Share};
 use motion::{Motion, Work};
@@ -216,7 +210,8 @@ impl PairCache {
         if rebuilt {
             grown.grow_all(workers, boxes, motion.renew(plan, boxes, &changes), shares);
             let stats = SceneStats::of(grown.as_slice());
-            tree.build(workers, grown.as_slice(), Members::From(0), &stats, pairs.screen())?;
+            let input = Input { workers, boxes: grown.as_slice(), screen: pairs.screen() };
+            tree.build(input, Members::From(0), &stats)?;
             let most = motion.most_kept(boxes.len());
             // Dense places move from list to list, and each list has grown to its largest.
             if kept.iter().map(Pairs::capacity).sum::<usize>() > most + most / 4 {
@@ -233,7 +228,8 @@ impl PairCache {
             let far = shares.iter().flat_map(|s| s.far.iter().copied());
             let far = (far, changes.new.start);
             let wanted = motion.wants_renewal(boxes.len()) || tree.tree.is_sparse(boxes.len());
-            if tree.update(workers, grown.as_slice(), far, pairs.screen(), wanted)? {
+            let input = Input { workers, boxes: grown.as_slice(), screen: pairs.screen() };
+            if tree.update(input, far, wanted)? {
                 motion.renewed();
             }
             tree.refit(workers, grown.as_slice(), shares.iter().map(|s| &s.left[..]))?;
@@ -433,11 +429,11 @@ mod tests {
                 }
                 method.motion.prices.keepers = Width::new(frame / 40 % 2);
                 method.find_pairs(&boxes, &mut pairs).unwrap();
-                let expected = double_loop(&boxes, |_| true);
+                let expected = double_loop(&boxes);
                 assert_eq!(pairs.fingerprint(), expected.fingerprint(), "{simd:?}, frame {frame}");
                 kept += u32::from(method.last_frame().kind == Updated);
-                renewals += u32::from(method.last_frame().kind == Updated && method.tree.tree.places() < places);
-                places = method.tree.tree.places();
+                renewals += u32::from(method.last_frame().kind == Updated && method.tree.tree.places < places);
+                places = method.tree.tree.places;
             }
             assert!(renewals > 1 && kept > 130, "{renewals} renewals, {kept} frames with kept pairs");
         }

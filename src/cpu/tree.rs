@@ -51,7 +51,7 @@ pub struct Tree {
     /// The box in each lane of the leaves, leaf after leaf.
     ids: Vec<u32>,
     /// Places in use, those of removed boxes included.
-    places: usize,
+    pub(crate) places: usize,
     /// The leaves, then nodes with the bounds of the leaves, and so on. There are at least two levels. The last level
     /// that is not empty had at most 16 nodes when the tree was built.
     levels: Vec<Vec<Node>>,
@@ -108,7 +108,8 @@ impl Tree {
     /// [`Error::InvalidBox`] for the first invalid box, and [`Error::OutOfMemory`].
     pub fn of(boxes: &[Aabb]) -> Result<Self, Error> {
         let mut tree = Self::new(Simd::at_most(SimdLevel::in_use()));
-        tree.build(&Workers::one(), boxes, Members::From(0), &SceneStats::of(boxes), None)?;
+        let input = Input { workers: &Workers::one(), boxes, screen: None };
+        tree.build(input, Members::From(0), &SceneStats::of(boxes))?;
         Ok(tree)
     }
 
@@ -117,19 +118,12 @@ impl Tree {
         self.order.reserve(objects)
     }
 
-    /// Builds the tree of the members of `boxes`, of which `stats` are the statistics. Passive boxes come last.
+    /// Builds the tree of the members, of which `stats` are the statistics. Passive boxes come last.
     ///
     /// # Errors
     /// [`Error::InvalidBox`] for the first invalid member, and [`Error::OutOfMemory`].
-    pub(crate) fn build(
-        &mut self,
-        workers: &Workers,
-        boxes: &[Aabb],
-        members: Members<'_>,
-        stats: &SceneStats,
-        screen: Option<&Screen>,
-    ) -> Result<(), Error> {
-        let (input, curve) = (Input { workers, boxes, screen }, Curve::over(stats, members.len(boxes)));
+    pub(crate) fn build(&mut self, input: Input<'_>, members: Members<'_>, stats: &SceneStats) -> Result<(), Error> {
+        let curve = Curve::over(stats, members.len(input.boxes));
         let split = self.order.sort(input, members, &curve)?;
         self.arrange(input, curve, split, |_| false)?;
         self.sweep(input);
@@ -310,12 +304,6 @@ impl Tree {
     /// Returns half the surface area of all leaves, whose edges count as at most `longest`.
     fn half_area(&self, longest: f32) -> f64 {
         self.levels.get(1).map_or(0.0, |level| level.iter().map(|node| f64::from(node.half_area(longest))).sum())
-    }
-
-    /// Returns the number of places in use, those of removed boxes included.
-    #[cfg(test)]
-    pub(crate) fn places(&self) -> usize {
-        self.places
     }
 
     /// Returns whether too many lanes are empty for this many boxes.

@@ -1,7 +1,7 @@
 //! Finds the pairs of one of many worlds, on one thread: small ones without a sort, large ones with a tree.
 
 use crate::cpu::kernel::small::{MOST_ROWS, small_world};
-use crate::cpu::{Columns, Members, Simd, Tree, Workers, ensure, order_key, sweep_rows};
+use crate::cpu::{Columns, Input, Members, Simd, Tree, Workers, ensure, order_key, sweep_rows};
 use crate::{Aabb, Error, Pairs, SceneStats};
 use std::ops::Range;
 
@@ -31,9 +31,8 @@ impl WorldSearch {
         let Self { keys, columns, tree, simd } = self;
         let (first, len) = (world.start, world.len());
         if len > MOST_SWEPT {
-            let boxes = &boxes[..world.end];
-            let stats = SceneStats::of(&boxes[first..]);
-            tree.build(&Workers::one(), boxes, Members::From(first), &stats, pairs.screen())?;
+            let input = Input { workers: &Workers::one(), boxes: &boxes[..world.end], screen: pairs.screen() };
+            tree.build(input, Members::From(first), &SceneStats::of(&boxes[world]))?;
             tree.self_pairs(0, 1, pairs);
             return Ok(());
         }

@@ -1,7 +1,7 @@
 //! The bodies that were not set for some updates: a tree of them, and the pairs among them.
 
 use super::slots::Slots;
-use crate::cpu::{GrownTree, Members, Simd, SimdLevel, Tree, Wear, Workers};
+use crate::cpu::{GrownTree, Input, Members, Simd, SimdLevel, Tree, Wear, Workers};
 use crate::{Aabb, Error, SceneStats};
 
 /// What it costs to sort a box into a tree, in nodes looked at by queries: 25 and 5 ns on the Zen 3 host of
@@ -86,7 +86,7 @@ impl Resting {
     /// Puts the arrivals into the tree.
     pub(super) fn update(&mut self, slots: &Slots) -> Result<(), Error> {
         let boxes = &slots.boxes[..];
-        let worn = self.wear.excess() > SORT_IN_NODES * self.len() as u64;
+        let worn = self.wear.excess > SORT_IN_NODES * self.len() as u64;
         self.arrived.clear();
         if self.arrivals.is_empty() && !worn && self.is_built || self.len() == 0 {
             return Ok(());
@@ -101,18 +101,18 @@ impl Resting {
         std::mem::swap(&mut self.arrivals, &mut self.arrived);
         let arrivals = &self.arrived;
         let is_built = std::mem::take(&mut self.is_built);
-        let one = Workers::one();
+        let input = Input { workers: &Workers::one(), boxes, screen: None };
         if many || worn || !is_built || self.tree.tree.is_sparse(self.len) {
             self.members.clear();
             self.members.extend(slots.resting());
             mark(&mut self.bits, &self.members, boxes.len());
             let stats = SceneStats::of_members(boxes, &self.members);
             self.wear = Wear::default();
-            self.tree.build(&one, boxes, Members::Of(&self.members), &stats, None)?;
+            self.tree.build(input, Members::Of(&self.members), &stats)?;
         } else {
             mark(&mut self.bits, arrivals, boxes.len());
-            self.tree.update(&one, boxes, (arrivals.iter().copied(), 0), None, false)?;
-            self.tree.refit(&one, boxes, std::iter::once(&arrivals[..]))?;
+            self.tree.update(input, (arrivals.iter().copied(), 0), false)?;
+            self.tree.refit(input.workers, boxes, std::iter::once(&arrivals[..]))?;
         }
         self.is_built = true;
         Ok(())

@@ -190,6 +190,7 @@ fn brute<L: Level>(view: &View<'_>, rows: Range<usize>, first: impl Fn(usize) ->
 mod tests {
     use super::super::node::LANES;
     use super::*;
+    use crate::cpu::brute::double_loop;
     use crate::{Aabb, Filter, Membership};
     use std::sync::Arc;
 
@@ -245,10 +246,7 @@ mod tests {
         for (row, &id) in at.iter().enumerate() {
             columns.as_mut().set(row, &boxes[id], 0, id as u32);
         }
-        let mut expected = Pairs::new();
-        (0..boxes.len()).for_each(|j| {
-            (0..j).filter(|&i| boxes[i].overlaps(&boxes[j])).for_each(|i| expected.push(i as u32, j as u32));
-        });
+        let expected = double_loop(&boxes);
         let (mut swept, mut tested) = (Pairs::new(), Pairs::new());
         let view = View::new(&columns);
         sweep::<false, _>(&view, 0..boxes.len(), &mut swept, Plain);

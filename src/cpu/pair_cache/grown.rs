@@ -1,13 +1,9 @@
 //! The grown boxes: finds the boxes that have left theirs, and grows new ones.
 
 use super::tree::GrownTree;
-use crate::aabb::Aabb;
-use crate::cpu::columns::ensure;
 use crate::cpu::kernel::contain::{each_doubtful_block, within};
-use crate::cpu::level::Simd;
-use crate::cpu::workers::Workers;
-use crate::error::Error;
-use crate::filter::{Filter, Membership};
+use crate::cpu::{Simd, Workers, ensure};
+use crate::{Aabb, Error, Filter, Membership};
 use std::ops::Range;
 
 /// Contains no box, not even an infinite one: a box that has no grown box yet counts as having left it.
@@ -226,17 +222,12 @@ impl Share {
 }
 
 impl Margin {
-    /// Returns the clamped mean edge of a box.
-    #[inline]
-    fn edge(&self, b: &Aabb) -> f32 {
-        let mean = (0..3).map(|a| b.max[a] - b.min[a]).sum::<f32>() / 3.0;
-        // False for NaN too, the edge of an infinite box.
-        if mean < self.longest_edge { mean } else { self.longest_edge }
-    }
-
     /// Grows a valid box on every side.
     #[inline]
     fn grow(&self, b: &Aabb) -> Aabb {
-        b.grown(self.share * self.edge(b))
+        let mean = (0..3).map(|a| b.max[a] - b.min[a]).sum::<f32>() / 3.0;
+        // False for NaN too, the edge of an infinite box.
+        let edge = if mean < self.longest_edge { mean } else { self.longest_edge };
+        b.grown(self.share * edge)
     }
 }

@@ -7,9 +7,9 @@ mod tests;
 use super::grown::{Changes, Margin};
 use super::prices::Prices;
 use super::width::Width;
-use crate::aabb::Aabb;
-use crate::cpu::tree::Wear;
-use crate::load::{Displacement, FramePlan, is_same_pace};
+use crate::cpu::Wear;
+use crate::load::{Displacement, is_same_pace};
+use crate::{Aabb, FramePlan};
 use std::ops::Range;
 
 /// Margins that are compared, as shares of a mean edge.
@@ -119,7 +119,7 @@ struct Keeping {
 impl Keeping {
     /// Returns what the wear of the tree has cost for each box.
     fn excess(&self, objects: usize) -> f32 {
-        cost::nodes(cost::far(objects), self.wear.excess() as f32) / objects.max(1) as f32
+        cost::nodes(cost::far(objects), self.wear.excess as f32) / objects.max(1) as f32
     }
 
     /// Half the margin of the grown boxes.

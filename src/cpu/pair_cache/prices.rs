@@ -96,26 +96,26 @@ impl Prices {
             return;
         }
         let cost = f64::from(cost);
-        let before = self.of_scratch.get().unwrap_or(cost);
+        let before = self.of_scratch.0.unwrap_or(cost);
         if self.frames <= FEWEST_FRAMES {
-            self.of_scratch = MeanTime::of(before.min(cost));
+            self.of_scratch.0 = Some(before.min(cost));
             return;
         }
         self.of_scratch.add(cost);
         // A frame with kept pairs takes as long as before: the first frames after a build told too little.
         if self.is_beside {
-            let over = before / self.of_scratch.get().unwrap_or(cost);
+            let over = before / self.of_scratch.0.unwrap_or(cost);
             self.change_keeping(|keeping| keeping * over);
         }
     }
 
     fn change_keeping(&mut self, change: impl Fn(f64) -> f64) {
-        self.keeping = self.keeping.get().map(change).map_or_else(MeanTime::default, MeanTime::of);
+        self.keeping.0 = self.keeping.0.map(change);
     }
 
     /// Cost of a frame with kept pairs over that from scratch, as far as that is known.
     fn measured(&self) -> f64 {
-        self.keeping.get().unwrap_or(1.0)
+        self.keeping.0.unwrap_or(1.0)
     }
 
     /// Returns whether a try of keeping boxes of this pace is worth it by what the model says. The clock ends a try
@@ -171,13 +171,13 @@ impl Prices {
                 return true;
             }
         }
-        let of_scratch = self.of_scratch.get().unwrap_or(1.0) as f32;
+        let of_scratch = self.of_scratch.0.unwrap_or(1.0) as f32;
         let (expected, scratch) = (work * of_scratch, scratch * of_scratch);
         let took = took.unwrap_or(expected);
         let mut most = MOST_OF_FIRST * scratch;
         if !is_first {
             most = MOST_RISE * expected * self.measured() as f32;
-            (self.keeping, self.is_beside) = (MeanTime::of(self.measured()), true);
+            (self.keeping.0, self.is_beside) = (Some(self.measured()), true);
             self.keeping.add(f64::from(took / expected));
         }
         // NaN, of 0 over 0, counts as 0.

@@ -2,9 +2,8 @@
 
 use super::grown::Grown;
 use super::tree::GrownTree;
-use crate::aabb::Aabb;
 use crate::cpu::kernel::{overlap, prefetch};
-use crate::pairs::Pairs;
+use crate::{Aabb, Pairs};
 
 /// What is needed to find the pairs of a frame in the lists of kept pairs.
 pub(super) struct Sift<'a> {

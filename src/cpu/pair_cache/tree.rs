@@ -4,16 +4,8 @@
 //! are sorted anew.
 
 use super::grown::NOTHING;
-use crate::aabb::Aabb;
-use crate::cpu::columns::{ensure, part, split};
-use crate::cpu::kernel::node::LANES;
-use crate::cpu::level::Simd;
-use crate::cpu::sort::sort;
-use crate::cpu::tree::{Members, NOBODY, Tree};
-use crate::cpu::workers::Workers;
-use crate::error::Error;
-use crate::filter::Screen;
-use crate::load::SceneStats;
+use crate::cpu::{Input, LANES, Members, NOBODY, Simd, Tree, Workers, ensure, part, sort, split};
+use crate::{Aabb, Error, SceneStats};
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// Fewest boxes that all threads move in a phase: fewer are moved in less time than a phase takes.
@@ -46,17 +38,10 @@ impl GrownTree {
         ensure(&mut self.place_of, objects, "boxes in a tree")
     }
 
-    /// Builds the tree of the members of `boxes`, of which `stats` are the statistics.
-    pub(crate) fn build(
-        &mut self,
-        workers: &Workers,
-        boxes: &[Aabb],
-        members: Members<'_>,
-        stats: &SceneStats,
-        screen: Option<&Screen>,
-    ) -> Result<(), Error> {
-        self.tree.build(workers, boxes, members, stats, screen)?;
-        self.note_places(workers, boxes.len())
+    /// Builds the tree of the members, of which `stats` are the statistics.
+    pub(crate) fn build(&mut self, input: Input<'_>, members: Members<'_>, stats: &SceneStats) -> Result<(), Error> {
+        self.tree.build(input, members, stats)?;
+        self.note_places(input.workers, input.boxes.len())
     }
 
     /// Moves the boxes `far` to new leaves, which have no bounds until [`refit`](Self::refit) sets them; those from
@@ -64,12 +49,11 @@ impl GrownTree {
     /// whether they stand in the new order.
     pub(crate) fn update(
         &mut self,
-        workers: &Workers,
-        boxes: &[Aabb],
+        input: Input<'_>,
         (far, new): (impl Iterator<Item = u32> + Clone, usize),
-        screen: Option<&Screen>,
         wanted: bool,
     ) -> Result<bool, Error> {
+        let Input { workers, boxes, screen } = input;
         ensure(&mut self.place_of, boxes.len(), "boxes in a tree")?;
         ensure(&mut self.out, boxes.len().div_ceil(64), "boxes in a tree")?;
         far.clone().take_while(|&id| (id as usize) < new).for_each(|id| self.remove(id));
@@ -78,7 +62,7 @@ impl GrownTree {
             far.clone().for_each(|id| self.out[id as usize / 64] |= 1 << (id % 64));
             let out = |id: u32| self.out[id as usize / 64] >> (id % 64) & 1 == 1;
             let jumped = (far.clone(), out);
-            let done = self.tree.renew(workers, boxes, jumped, || SceneStats::of(boxes), screen);
+            let done = self.tree.renew(input, jumped, || SceneStats::of(boxes));
             far.clone().for_each(|id| self.out[id as usize / 64] = 0);
             renewed = done?;
             if renewed {
@@ -195,13 +179,15 @@ mod tests {
         let (workers, mut tree) = (Workers::one(), GrownTree::new(Simd::Portable));
         let nodes =
             |tree: &GrownTree, boxes: &[Aabb]| -> u32 { boxes.iter().map(|b| tree.tree.overlapping(b, |_| {})).sum() };
-        tree.build(&workers, &boxes, Members::From(0), &SceneStats::of(&boxes), None).unwrap();
+        let input = Input { workers: &workers, boxes: &boxes, screen: None };
+        tree.build(input, Members::From(0), &SceneStats::of(&boxes)).unwrap();
         let new = nodes(&tree, &boxes);
         for frame in 0.. {
             let jumped: Vec<u32> = (frame..4000).step_by(100).collect();
             jumped.iter().for_each(|&id| boxes[id as usize] = anywhere(id));
             let far = (jumped.iter().copied(), boxes.len());
-            let renewed = tree.update(&workers, &boxes, far, None, frame == 0).unwrap();
+            let input = Input { workers: &workers, boxes: &boxes, screen: None };
+            let renewed = tree.update(input, far, frame == 0).unwrap();
             tree.refit(&workers, &boxes, std::iter::once(&jumped[..])).unwrap();
             if renewed {
                 break;

@@ -2,8 +2,8 @@
 
 use super::curve::Curve;
 use super::{Input, Members, Tree};
-use crate::cpu::{Workers, part};
-use crate::{Aabb, Error, SceneStats, Screen};
+use crate::cpu::part;
+use crate::{Error, SceneStats};
 
 /// Steps of a renewal in which codes are made, each for one part of the boxes.
 const RENEWAL_PARTS: usize = 4;
@@ -25,13 +25,12 @@ impl Tree {
     /// the number of boxes has changed since the last call, this begins again.
     pub(crate) fn renew(
         &mut self,
-        workers: &Workers,
-        boxes: &[Aabb],
+        input: Input<'_>,
         (jumped, out): (impl Iterator<Item = u32>, impl Fn(u32) -> bool + Sync),
         stats: impl FnOnce() -> SceneStats,
-        screen: Option<&Screen>,
     ) -> Result<bool, Error> {
-        let (len, input) = (boxes.len(), Input { workers, boxes, screen });
+        let Input { boxes, screen, .. } = input;
+        let len = boxes.len();
         let begin = || Renewal { curve: Curve::over(&stats(), len), boxes: len, step: 0, active: 0 };
         let mut renewal = self.renewal.take().filter(|renewal| renewal.boxes == len).unwrap_or_else(begin);
         if renewal.step <= RENEWAL_PARTS {

@@ -217,7 +217,7 @@ mod tests {
         }
         let all = trees.len() * FRAMES as usize;
         assert!(swept > all * 3 / 4 && swept_fixed > all / 3, "{swept} and {swept_fixed} frames of {all}");
-        assert!(trees.iter().all(|(_, upkeep)| upkeep.builds() < FRAMES / 2), "trees are refitted");
+        assert!(trees.iter().all(|(_, upkeep)| upkeep.builds < FRAMES / 2), "trees are refitted");
     }
 
     #[test]
@@ -225,7 +225,8 @@ mod tests {
         let mut boxes: Vec<Aabb> = (0..12_000).map(|k| long_box(k, 30.0)).collect();
         let swept = |boxes: &[Aabb]| {
             let mut tree = Tree::new(Simd::Portable);
-            tree.build(&workers(), boxes, Members::From(0), &SceneStats::of(boxes), None).unwrap();
+            let input = Input { workers: &workers(), boxes, screen: None };
+            tree.build(input, Members::From(0), &SceneStats::of(boxes)).unwrap();
             let long = |leaves: &Range<usize>| tree.sweeps.kinds.iter().find(|k| k.leaves == *leaves).map(|k| k.long);
             let pairs = tree.sweeps.apart.iter().map(|apart| [&apart.leaves, &apart.others].map(long));
             pairs.collect::<Vec<_>>().contains(&[Some(1), Some(2)])

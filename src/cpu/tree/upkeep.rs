@@ -33,8 +33,9 @@ pub(crate) struct Upkeep {
     search: MeanTime,
     /// Whether measured times decide.
     timed: bool,
+    /// Number of trees that were built.
     #[cfg(test)]
-    builds: u64,
+    pub(crate) builds: u64,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -57,12 +58,6 @@ impl Upkeep {
     /// `timed`: measured times decide, and not areas alone.
     pub(crate) fn new(timed: bool) -> Self {
         Self { timed, ..Self::default() }
-    }
-
-    /// Returns the number of trees that were built.
-    #[cfg(test)]
-    pub(crate) fn builds(&self) -> u64 {
-        self.builds
     }
 
     /// Forgets the tree: the next frame builds it.
@@ -98,11 +93,11 @@ impl Upkeep {
         if self.refitted(tree, input, plan).is_some() {
             return Ok(());
         }
-        let Input { workers, boxes, screen } = input;
+        let boxes = input.boxes;
         self.tree = None;
         let started = Instant::now();
         let stats = plan.stats(boxes);
-        tree.build(workers, boxes, Members::From(0), &stats, screen)?;
+        tree.build(input, Members::From(0), &stats)?;
         #[cfg(test)]
         (self.builds += 1);
         let longest = stats.ranges.map(|r| r.1).into_iter().fold(0.0, f64::max) as f32;
@@ -146,7 +141,7 @@ impl Upkeep {
 
     /// Returns what a build costs over a refit, in searches.
     fn price(&self) -> f64 {
-        match (self.build.get(), self.refit.get(), self.search.get()) {
+        match (self.build.0, self.refit.0, self.search.0) {
             (Some(build), refit, Some(search)) if self.timed && search > 0.0 => {
                 ((build - refit.unwrap_or(0.5 * build)) / search).clamp(0.05, 20.0)
             }

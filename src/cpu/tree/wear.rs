@@ -6,7 +6,7 @@ pub(crate) struct Wear {
     /// Nodes and queries right after the boxes were sorted.
     fresh: [u64; 2],
     /// Nodes since then beyond what as many queries looked at in the fresh tree.
-    excess: u64,
+    pub(crate) excess: u64,
 }
 
 impl Wear {
@@ -20,9 +20,5 @@ impl Wear {
             // Saturating: they may have looked at fewer.
             self.excess = (self.excess + nodes).saturating_sub((looked * queries).div_ceil(known));
         }
-    }
-
-    pub(crate) fn excess(&self) -> u64 {
-        self.excess
     }
 }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::cpu::{Members, Simd, Workers};
+use crate::cpu::{Input, Members, Simd, Workers};
 use crate::{SceneStats, splitmix};
 
 const INF: f32 = f32::INFINITY;
@@ -50,7 +50,8 @@ fn trees(random: &mut Random, len: usize, churn: bool) -> (Vec<Tree>, Vec<Option
     let mut trees: Vec<Tree> = Simd::every().map(Tree::new).collect();
     let mut present: Vec<Option<Aabb>> = boxes.iter().copied().map(Some).collect();
     for tree in &mut trees {
-        tree.build(&Workers::one(), &boxes, Members::From(0), &SceneStats::of(&boxes), None).unwrap();
+        let input = Input { workers: &Workers::one(), boxes: &boxes, screen: None };
+        tree.build(input, Members::From(0), &SceneStats::of(&boxes)).unwrap();
     }
     if churn {
         let gone: Vec<usize> = (0..len).filter(|k| k % 3 == 0 || (len / 4..len / 2).contains(k)).collect();
@@ -170,7 +171,8 @@ fn moved_boxes_meet_what_the_double_loop_finds() {
             // What it overlaps, it meets at once.
             for tree in trees {
                 let mut overlapping = Vec::new();
-                tree.overlapping(&moved, |id| overlapping.push((id, 0)));
+                let looked = tree.overlapping(&moved, |id| overlapping.push((id, 0)));
+                assert!(looked as usize <= tree.levels.iter().map(Vec::len).sum(), "each node is looked at once");
                 overlapping.sort_unstable();
                 assert_eq!(cast(tree, &moved, motion, 0.0), overlapping);
             }
