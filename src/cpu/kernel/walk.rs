@@ -298,35 +298,6 @@ mod tests {
     use crate::Pair;
     use crate::cpu::Simd;
 
-    /// Returns 300 boxes in 19 leaves. The last leaf has empty lanes.
-    fn scene() -> (Vec<Aabb>, Vec<Vec<Node>>, Vec<u32>) {
-        let boxes: Vec<Aabb> =
-            (0..300).map(|k| Aabb::cube([k as f32 / 9.0, (k * 7 % 16) as f32, (k * 3 % 16) as f32], 2.5)).collect();
-        let mut levels = vec![vec![Node::EMPTY; 19], vec![Node::EMPTY; 2], vec![]];
-        for (k, b) in boxes.iter().enumerate() {
-            levels[0][k / LANES].set(k % LANES, b);
-            assert!(levels[1][k / LANES / LANES].widen(k / LANES % LANES, b) || k % LANES > 0);
-        }
-        (boxes, levels, (0..19 * LANES as u32).collect())
-    }
-
-    #[test]
-    fn every_level_finds_the_lanes_that_overlap() {
-        let (boxes, levels, ids) = scene();
-        let walk = Walk { levels: &levels, ids: &ids, far: true, apart: &[], marks: None };
-        let infinite = Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]);
-        let queries = (0..60).map(|k| Aabb::cube([(k % 34) as f32, (k % 13) as f32, (k % 11) as f32], 0.1 * k as f32));
-        for query in queries.chain([infinite]) {
-            let expected: Vec<usize> = (0..boxes.len()).filter(|&k| boxes[k].overlaps(&query)).collect();
-            for simd in Simd::every() {
-                let mut found = Vec::new();
-                let looked = each_overlapping(simd, &walk, &query, || Membership::ALL, |k| found.push(k));
-                assert_eq!(found, expected, "{simd:?}");
-                assert!(looked >= 2 && looked as usize <= 2 + 19);
-            }
-        }
-    }
-
     #[test]
     fn every_level_writes_the_pairs_of_any_hits() {
         fn write<L: Level>(others: &[u32; LANES], hits: u32, level: L) -> [Pair; LANES] {
@@ -346,43 +317,6 @@ mod tests {
                 let count = hits.count_ones() as usize;
                 assert_eq!(written[..count], expected[..count], "{simd:?} {hits:b}");
             }
-        }
-    }
-
-    #[test]
-    fn every_level_finds_each_pair_once() {
-        let (boxes, levels, ids) = scene();
-        let walk = Walk { levels: &levels, ids: &ids, far: false, apart: &[], marks: None };
-        let mut expected = Pairs::new();
-        (0..300_u32).for_each(|j| {
-            (0..j).filter(|&i| boxes[i as usize].overlaps(&boxes[j as usize])).for_each(|i| expected.push(i, j));
-        });
-        let outside: Vec<Aabb> = (0..LANES).map(|k| Aabb::cube([2.0 * k as f32, 8.0, 8.0], 3.0)).collect();
-        let mut group = Group::of(&outside[0]);
-        // Lane 15 stays empty.
-        outside[..15].iter().enumerate().for_each(|(lane, b)| group.set(lane, b, 1000 + lane as u32));
-        let across = outside[..15].iter().flat_map(|a| boxes.iter().filter(|b| a.overlaps(b))).count();
-        for simd in Simd::every() {
-            let mut found = Pairs::new();
-            for leaves in [0..3, 3..4, 4..19] {
-                self_pairs(simd, &walk, leaves, &mut found);
-            }
-            assert_eq!(found.fingerprint(), expected.fingerprint(), "{simd:?}");
-            let apart = [(0..3, 5..6), (2..9, 9..16), (2..4, 18..19)];
-            let apart = apart.map(|(leaves, others)| Apart { leaves, others });
-            let leaf = |id: u32| id as usize / LANES;
-            let compared = |i, j| !apart.iter().any(|a| a.leaves.contains(&leaf(i)) && a.others.contains(&leaf(j)));
-            let mut rest = Pairs::new();
-            expected.iter().filter(|&&(i, j)| compared(i, j)).for_each(|&(i, j)| rest.push(i, j));
-            found.clear();
-            self_pairs(simd, &Walk { apart: &apart, ..walk }, 0..19, &mut found);
-            assert_eq!(found.fingerprint(), rest.fingerprint(), "{simd:?}");
-            found.clear();
-            pairs_with(simd, &walk, &group, &mut found);
-            assert!(
-                found.len() == across && found.iter().all(|&(a, b)| a < 300 && (1000..1015).contains(&b)),
-                "{simd:?}"
-            );
         }
     }
 }
