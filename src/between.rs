@@ -94,12 +94,8 @@ impl Between {
             let sorted = tree.others();
             outputs.find(workers, pairs, |k, parts, list| {
                 for keys in sorted[part(sorted.len(), k, parts)].chunks(LANES) {
-                    let mut group = Group::of(&b[keys[0] as u32 as usize]);
-                    for (lane, &key) in keys.iter().enumerate() {
-                        let id = key as u32;
-                        group.set(lane, &b[id as usize], second + id);
-                    }
-                    tree.pairs_with(&group, list);
+                    let group = Group::of(keys.iter().map(|&key| (b[key as u32 as usize], second + key as u32)));
+                    group.into_iter().for_each(|group| tree.pairs_with(&group, list));
                 }
             });
         }

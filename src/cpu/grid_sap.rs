@@ -300,16 +300,12 @@ impl Task {
     fn group(&self, at: usize, axis: usize) -> Option<Group> {
         let of = &self.columns;
         let rows = at..(at + LANES).min(of.len());
-        let begins = &of.begins[rows.clone()];
-        let mut group: Option<Group> = None;
-        for (lane, row) in rows.enumerate().filter(|&(lane, _)| begins[lane] == BOTH) {
+        Group::of(rows.filter(|&row| of.begins[row] == BOTH).map(|row| {
             let mut b = Aabb::default();
             for k in 0..3 {
                 (b.min[(axis + k) % 3], b.max[(axis + k) % 3]) = (of.low[k][row], of.high[k][row]);
             }
-            let group = group.get_or_insert_with(|| Group::of(&b));
-            group.set(lane, &b, of.ids[row]);
-        }
-        group
+            (b, of.ids[row])
+        }))
     }
 }

@@ -111,16 +111,17 @@ impl Node {
 }
 
 impl Group {
-    /// Makes a group without boxes, for boxes near these bounds.
-    pub(crate) fn of(bounds: &Aabb) -> Self {
-        Self { node: Node::EMPTY, bounds: *bounds, ids: [NOBODY; LANES] }
-    }
-
-    /// Writes a box to an empty lane.
+    /// Makes a group of up to 16 boxes with their ids; `None` without a box.
     #[inline]
-    pub(crate) fn set(&mut self, lane: usize, b: &Aabb, id: u32) {
-        self.node.set(lane, b);
-        self.bounds = self.bounds.union(b);
-        self.ids[lane] = id;
+    pub(crate) fn of(boxes: impl Iterator<Item = (Aabb, u32)>) -> Option<Self> {
+        let mut boxes = boxes.peekable();
+        let &(bounds, _) = boxes.peek()?;
+        let mut group = Self { node: Node::EMPTY, bounds, ids: [NOBODY; LANES] };
+        for (lane, (b, id)) in boxes.enumerate() {
+            group.node.set(lane, &b);
+            group.bounds = group.bounds.union(&b);
+            group.ids[lane] = id;
+        }
+        Some(group)
     }
 }

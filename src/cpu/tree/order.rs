@@ -299,10 +299,8 @@ mod tests {
         let nested = |k: u64| at(k, 100.0 * 1.0e-3_f32.powi((k % 5) as i32), [0.0; 3]);
         let pooled = |k: u64| if k.is_multiple_of(2) { one(k) } else { at(k, 100.0, [3.0e9, -8.0e9, 5.0e9]) };
         let count = 40_000;
-        let even = longest_edge(
-            &(0..count).map(one).collect::<Vec<_>>(),
-            &ordered(&(0..count).map(one).collect::<Vec<_>>(), 1, None).0,
-        );
+        let evenly: Vec<Aabb> = (0..count).map(one).collect();
+        let even = longest_edge(&evenly, &ordered(&evenly, 1, None).0);
         for (name, of) in [("row", &row as &dyn Fn(u64) -> Aabb), ("nested", &nested), ("pooled", &pooled)] {
             let boxes: Vec<Aabb> = (0..count).map(of).collect();
             let (ids, moving) = ordered(&boxes, 1, None);
