@@ -1,14 +1,12 @@
 //! What ours know of this machine, and what the document says of it.
 
 use crate::settings::Settings;
-use rayon::ThreadPool;
 use sapwise::tuning::Source;
 use sapwise::{Registry, Tuning};
 use sapwise_tune::hardware::ParameterId;
 use sapwise_tune::measure::{self, Options};
 use sapwise_tune::{Hardware, Model};
 use std::process::Command;
-use std::sync::Arc;
 
 /// The tuning for a number of threads that the built-in model predicts from hardware parameters, which are measured
 /// now; written down by hand where nothing is timed.
@@ -24,21 +22,6 @@ pub(crate) fn tuning(registry: &Registry, threads: u32, settings: &Settings) -> 
     let prediction = model.predict(&hardware, &registry.available()).map_err(|e| e.to_string())?;
     // Where there are costs, they decide; the slice through loads is for people.
     Ok(Tuning::from_costs(Source::Predicted, "uniform", prediction.costs, &[]))
-}
-
-/// A pool whose threads are bound to a core each, as those of a registry with `pin_threads`.
-///
-/// # Errors
-/// When the system refuses the threads.
-pub(crate) fn pinned_pool(threads: usize) -> Result<Arc<ThreadPool>, String> {
-    let cores = core_affinity::get_core_ids().unwrap_or_default();
-    let bind = move |k: usize| {
-        if let Some(&core) = cores.get(k).filter(|_| cores.len() >= threads) {
-            core_affinity::set_for_current(core);
-        }
-    };
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).start_handler(bind).build();
-    pool.map(Arc::new).map_err(|e| e.to_string())
 }
 
 /// The machine and the build in one line of Markdown.

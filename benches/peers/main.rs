@@ -43,10 +43,12 @@ mod tails;
 use contestants::{Contestant, ours, peers};
 use point::Point;
 use sapwise::Registry;
+use sapwise::internals::pinned_pool;
 use sapwise_scenes::Scenario;
 use settings::Settings;
 use std::io::Write;
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Fewest objects on two threads: below, no second thread gains anything.
@@ -91,7 +93,9 @@ fn compare(
     let mut registry = Registry::with_cores(threads);
     registry.pin_threads();
     let tuning = machine::tuning(&registry, threads, settings)?;
-    let pool = if threads > 1 { Some(machine::pinned_pool(threads as usize)?) } else { None };
+    // Bound to a core each, as the threads of the registry.
+    let pool = || pinned_pool(threads).map(Arc::new).map_err(|e| e.to_string());
+    let pool = if threads > 1 { Some(pool()?) } else { None };
     compared.push((threads, Vec::new()));
     let everyone = |scenario| {
         let mut all = ours(&registry, &tuning).map_err(|e| e.to_string())?;
