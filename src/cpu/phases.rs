@@ -255,62 +255,6 @@ mod shuttle_tests;
 #[cfg(all(test, not(shuttle)))]
 mod tests {
     use super::*;
-    use std::sync::atomic::AtomicBool;
-    use std::sync::mpsc;
-    use std::thread;
-
-    /// Numbers that are handed out one by one, and what was handed out.
-    struct Numbers {
-        next: AtomicUsize,
-        taken: Vec<AtomicBool>,
-    }
-
-    impl Numbers {
-        fn new(count: usize) -> Self {
-            Self { next: AtomicUsize::new(0), taken: (0..count).map(|_| AtomicBool::new(false)).collect() }
-        }
-
-        fn drain(&self) {
-            while let Some(taken) = self.taken.get(self.next.fetch_add(1, Ordering::Relaxed)) {
-                assert!(!taken.swap(true, Ordering::Relaxed), "handed out twice");
-            }
-        }
-    }
-
-    /// Every phase borrows from a stack frame that is gone soon after, and most helpers come too late.
-    #[test]
-    fn late_helpers_touch_no_closed_phase() {
-        let phases = Phases::default();
-        let (invite, invitations) = mpsc::channel();
-        let invitations = Mutex::new(invitations);
-        thread::scope(|scope| {
-            for _ in 0..3 {
-                scope.spawn(|| {
-                    loop {
-                        let came = lock(&invitations).recv();
-                        if came.is_err() {
-                            return;
-                        }
-                        phases.join(0);
-                    }
-                });
-            }
-            thread::scope(|scope| {
-                for caller in 0..4_usize {
-                    let (phases, invite) = (&phases, invite.clone());
-                    scope.spawn(move || {
-                        for k in 0..if cfg!(miri) { 20 } else { 5000 } {
-                            let numbers = Numbers::new((k + caller) % 7);
-                            phases.run(2, 3, &|| numbers.drain(), || invite.send(()).unwrap());
-                            assert!(numbers.taken.iter().all(|t| t.load(Ordering::Relaxed)));
-                        }
-                    });
-                }
-            });
-            drop(invite);
-        });
-        assert_eq!((phases.coming(), phases.list().open.len()), (0, 0));
-    }
 
     #[test]
     fn absent_helpers_are_neither_awaited_nor_invited_twice() {
@@ -324,59 +268,5 @@ mod tests {
         phases.join(0);
         phases.join(0);
         assert_eq!((phases.coming(), worked.load(Ordering::Relaxed)), (0, 100));
-    }
-
-    /// The helper goes on only when the caller is asleep or about to be.
-    #[test]
-    fn caller_sleeps_until_the_last_helper_is_done() {
-        let phases = Phases::default();
-        for _ in 0..if cfg!(miri) { 5 } else { 200 } {
-            let (came, left) = (AtomicBool::new(false), AtomicBool::new(false));
-            let caller = thread::current().id();
-            thread::scope(|scope| {
-                let (phases, came, left) = (&phases, &came, &left);
-                let work = move || {
-                    if thread::current().id() == caller {
-                        while !came.load(Ordering::Acquire) {
-                            thread::yield_now();
-                        }
-                        return;
-                    }
-                    came.store(true, Ordering::Release);
-                    // Until long after the caller has stopped spinning.
-                    while !phases.list().open.is_empty() {
-                        thread::yield_now();
-                    }
-                    (0..2000).for_each(|_| thread::yield_now());
-                    left.store(true, Ordering::Release);
-                };
-                phases.run(1, 1, &work, || _ = scope.spawn(move || phases.join(0)));
-                assert!(left.load(Ordering::Acquire));
-            });
-        }
-    }
-
-    #[test]
-    fn panic_of_helper_or_caller_ends_the_phase() {
-        let phases = Phases::default();
-        let caller = thread::current().id();
-        for on_caller in [false, true] {
-            let both = sync::Barrier::new(2);
-            let here = AtomicBool::new(false);
-            let caught = thread::scope(|scope| {
-                let phases = &phases;
-                let work = || {
-                    both.wait();
-                    assert!((thread::current().id() == caller) != on_caller, "a task panics");
-                    here.store(true, Ordering::Relaxed);
-                };
-                catch_unwind(AssertUnwindSafe(|| phases.run(1, 1, &work, || _ = scope.spawn(move || phases.join(0)))))
-            });
-            assert_eq!(caught.unwrap_err().downcast_ref(), Some(&"a task panics"));
-            assert!(here.into_inner(), "the other went on");
-            assert_eq!((phases.coming(), phases.list().open.len()), (0, 0));
-        }
-        // The panics are forgotten.
-        phases.run(1, 1, &|| (), || phases.join(0));
     }
 }

@@ -68,7 +68,8 @@ fn run_tasks(phases: &Phases, invite: &dyn Fn(), panics: bool) {
     };
     let end = catch_unwind(AssertUnwindSafe(|| phases.run(HELPERS, HELPERS, &work, invite)));
     open.store(false, Ordering::SeqCst);
-    assert_eq!(end.is_err(), panics);
+    let panic = end.err().map(|panic| *panic.downcast::<&str>().unwrap());
+    assert_eq!(panic, panics.then_some("the last task panics"));
     assert!(done.iter().all(|done| done.load(Ordering::SeqCst) == 1), "every task is done once");
 }
 
