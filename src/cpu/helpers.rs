@@ -12,9 +12,9 @@ const LINGER: u32 = 2000;
 /// Helpers: own ones, which start when the first frame wants them, or the threads of the program's pool.
 #[derive(Debug)]
 pub(crate) struct Helpers {
-    /// The number of own helpers, and whether each is pinned to its own CPU if that is allowed, and if there is one CPU
-    /// more than helpers.
+    /// The number of helpers.
     pub(crate) count: u32,
+    /// Whether each own one is pinned to its own CPU if that is allowed, and if there is one CPU more than helpers.
     pinned: bool,
     /// Nothing before the start.
     team: OnceLock<Team>,

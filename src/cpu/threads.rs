@@ -21,9 +21,9 @@ pub struct Threads {
     pub untimed: bool,
     #[cfg(feature = "parallel")]
     pools: Arc<Mutex<BTreeMap<Kind, Arc<Helpers>>>>,
-    /// The program's pool, with the number of its threads; see [`Registry::use_pool`](crate::Registry::use_pool).
+    /// The program's pool; see [`Registry::use_pool`](crate::Registry::use_pool).
     #[cfg(feature = "parallel")]
-    given: Option<(u32, Arc<Helpers>)>,
+    given: Option<Arc<Helpers>>,
 }
 
 /// The number of helpers of a pool, and whether they are pinned.
@@ -39,8 +39,7 @@ impl Threads {
     /// Takes a program's pool. Its threads run where the program has them.
     #[cfg(feature = "parallel")]
     pub fn of(pool: Arc<rayon::ThreadPool>) -> Self {
-        let threads = u32::try_from(pool.current_num_threads()).unwrap_or(u32::MAX);
-        Self { given: Some((threads, Arc::new(Helpers::of(pool)))), ..Self::default() }
+        Self { given: Some(Arc::new(Helpers::of(pool))), ..Self::default() }
     }
 
     /// Returns what these threads are: `pinned`, `free`, or `given` by the program.
@@ -61,7 +60,7 @@ impl Threads {
     /// Returns the most threads of an algorithm, its caller among them, if the program's pool bounds them.
     pub fn most(&self) -> Option<u32> {
         #[cfg(feature = "parallel")]
-        return self.given.as_ref().map(|(threads, _)| threads.saturating_add(1));
+        return self.given.as_ref().map(|given| given.count.saturating_add(1));
         #[cfg(not(feature = "parallel"))]
         None
     }
@@ -79,7 +78,7 @@ impl Threads {
     /// Returns a pool of `count` helpers, which may not have started; the program's own pool may have more.
     #[cfg(feature = "parallel")]
     pub(crate) fn helpers(&self, count: u32) -> Arc<Helpers> {
-        if let Some((_, given)) = &self.given {
+        if let Some(given) = &self.given {
             return Arc::clone(given);
         }
         let make = || Arc::new(Helpers::new(count, self.pinned));
