@@ -119,6 +119,10 @@ fn meeting(one: &Aabb, motion: [f32; 3], max: f32, other: &Aabb) -> Option<f32> 
     (enter <= leave).then_some(enter)
 }
 
+fn slot(handle: &Handle) -> u64 {
+    handle.to_bits() >> 32
+}
+
 fn distance(point: [f32; 3], b: &Aabb) -> f32 {
     let [x, y, z] = [0, 1, 2].map(|a| (b.min[a] - point[a]).max(point[a] - b.max[a]).max(0.0));
     (x * x + y * y + z * z).sqrt()
@@ -130,6 +134,10 @@ struct Model {
     bodies: BTreeMap<Handle, (Aabb, Body)>,
     /// All handles that there ever were.
     given: BTreeSet<Handle>,
+    /// The slots of bodies that were removed since the last update: no other body gets them before the next one.
+    removed: BTreeSet<u64>,
+    /// The most bodies at once, where removed ones count until the next update. Slots are less.
+    most: usize,
     /// Boxes at the last update.
     seen: BTreeMap<Handle, Aabb>,
     pairs: Vec<(Handle, Handle)>,
@@ -166,6 +174,7 @@ impl Model {
         self.begun = without(&pairs, &self.pairs);
         self.ended = without(&self.pairs, &pairs);
         self.pairs = pairs;
+        self.removed.clear();
         self.seen = self.bodies.iter().map(|(&handle, &(b, _))| (handle, b)).collect();
     }
 }
@@ -262,7 +271,12 @@ impl Run<'_> {
         for (handle, b) in given.into_iter().flatten().zip(boxes) {
             assert!(self.model.given.insert(handle), "{handle} was given twice");
             self.model.bodies.insert(handle, (b, body));
+            let (slot, removed) = (slot(&handle), &self.model.removed);
+            self.model.most = self.model.most.max(self.model.bodies.len() + removed.len());
+            assert!(!removed.contains(&slot), "slot {slot} was used again before an update");
         }
+        let highest = self.model.bodies.keys().map(slot).max();
+        assert!(highest.is_none_or(|slot| slot < self.model.most as u64), "{highest:?}, not below {}", self.model.most);
     }
 
     fn set(&mut self, count: usize) {
@@ -314,6 +328,7 @@ impl Run<'_> {
         assert_eq!(found, expected);
         if found.is_ok() {
             self.model.bodies.retain(|handle, _| !handles.contains(handle));
+            self.model.removed.extend(handles.iter().map(slot));
         }
     }
 
