@@ -25,7 +25,6 @@ impl MpiExchange {
     pub const WAIT_LIMIT: Duration = Duration::from_secs(600);
 
     /// The ranks of a communicator, which it duplicates: a collective operation.
-    #[must_use]
     pub fn new(communicator: &impl Communicator) -> Self {
         Self { communicator: communicator.duplicate(), wait_limit: Self::WAIT_LIMIT, addends: Vec::new() }
     }
