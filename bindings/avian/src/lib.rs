@@ -66,7 +66,6 @@ pub struct SapwiseBroadPhasePlugin<H: CollisionHooks = ()> {
 impl<H: CollisionHooks> SapwiseBroadPhasePlugin<H> {
     /// Makes the plugin with the empty space that `space` returns, for one that searches by a tuning of this machine:
     /// see [`Space::with`].
-    #[must_use]
     pub fn with(space: fn() -> Space) -> Self {
         Self { space, hooks: PhantomData }
     }
