@@ -9,21 +9,6 @@ use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Pairs, Reason, Registry};
 use std::cell::RefCell;
 use wasm_bindgen::prelude::*;
 
-#[wasm_bindgen(typescript_custom_section)]
-const TYPES: &str = r#"
-/** Which algorithm ran in the last frame, and why. */
-export interface Decision {
-  /** The algorithm, for instance "grid-sap@cpu1". */
-  algorithm: string;
-  /** The reason, with the time that was expected of it and of the next best. */
-  because: string;
-  /** Whether another algorithm ran in the frame before. */
-  switched: boolean;
-  /** Whether it is not the cheapest and ran to find out what it costs. */
-  trial: boolean;
-}
-"#;
-
 /// Returns the decision of a search as JavaScript sees it; `before` is the algorithm of the frame before.
 pub(crate) fn decision(search: &Adaptive, before: Option<&AlgorithmId>) -> JsValue {
     search.last_decision().map_or(JsValue::UNDEFINED, |decision| {

@@ -7,19 +7,6 @@ use js_sys::{Float32Array, Uint32Array};
 use sapwise::{Aabb, AlgorithmId, Error, Filter, PairOrder, Pairs, Registry};
 use wasm_bindgen::prelude::*;
 
-#[wasm_bindgen(typescript_custom_section)]
-const TYPES: &str = r#"
-/** What `findPairs` may be asked for beside the boxes. */
-export interface FindOptions extends Memberships {
-  /** Run this algorithm, for instance "bvh@cpu1" or in short "bvh". `algorithms()` lists them. */
-  algorithm?: string;
-  /** The most pairs: with more, the search ends with an error. */
-  limit?: number;
-  /** Boxes are a pair too if they are no further apart than this on each axis. */
-  margin?: number;
-}
-"#;
-
 #[wasm_bindgen]
 extern "C" {
     /// Options of [`find_pairs`].
@@ -86,9 +73,7 @@ fn grow(boxes: &mut [Aabb], margin: f64) -> Result<(), JsError> {
         return error(format!("margin is {margin}; give 0 or more and finite"));
     }
     // Growing would hide what is inverted.
-    if let Some((index, defect)) = boxes.iter().enumerate().find_map(|(k, b)| Some((k, b.defect()?))) {
-        return Err(Error::InvalidBox { index, defect }.into());
-    }
+    Aabb::check(boxes, 0)?;
     for aabb in boxes {
         // The sums are rounded down, and so to the highest 32-bit minimum that is not beyond them.
         let sums = aabb.max.map(|high| f64::from(high) + margin);

@@ -15,6 +15,10 @@ mod tuning;
 
 use wasm_bindgen::prelude::*;
 
+/// The types of what is no class.
+#[wasm_bindgen(typescript_custom_section)]
+const TYPES: &str = include_str!("types.d.ts");
+
 /// Runs once the module is loaded.
 #[wasm_bindgen(start)]
 fn start() {

@@ -6,21 +6,6 @@ use js_sys::{Object, Reflect};
 use sapwise::Membership;
 use wasm_bindgen::prelude::*;
 
-#[wasm_bindgen(typescript_custom_section)]
-const TYPES: &str = r"
-/** What a box or body may meet: one value for all boxes, or an array with one for each. */
-export interface Memberships {
-  /** The groups of the box, one bit each. By default all. */
-  groups?: Uint32Array | number;
-  /** The groups that it meets, one bit each. The masks of both boxes of a pair must allow the other. By default all. */
-  masks?: Uint32Array | number;
-  /** What it is a part of, such as a ragdoll: boxes with the same owner do not meet. 0, the default, is no owner. */
-  owner?: Uint32Array | number;
-  /** Whether it never moves, not 0 in an array: two fixed boxes do not meet. */
-  fixed?: Uint8Array | boolean;
-}
-";
-
 #[wasm_bindgen]
 extern "C" {
     /// An object with these members, and perhaps others.

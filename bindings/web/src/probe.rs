@@ -39,18 +39,6 @@ const LEAST_MS: f64 = 1.0;
 /// A step of the caller lasts about this long, so that a page stays alive.
 const STEP_MS: f64 = 30.0;
 
-#[wasm_bindgen(typescript_custom_section)]
-const TYPES: &str = r"
-/** How far a probe is. */
-export interface Progress {
-  /** Parts that are done, and all of them. */
-  done: number;
-  of: number;
-  /** What was done last, in words. */
-  text: string;
-}
-";
-
 /// Measures this machine as a page can, within a minute: clock, latency and bandwidth of memory, then every algorithm
 /// over three scenarios. Await `step` until `done` equals `of`. `report` returns what was measured until then. Works
 /// in a worker, too.

@@ -10,16 +10,6 @@ use sapwise::{Body, Error, Handle, Ray, Space};
 use std::cell::RefCell;
 use wasm_bindgen::prelude::*;
 
-#[wasm_bindgen(typescript_custom_section)]
-const TYPES: &str = r"
-/** What a query found, the nearest first. */
-export interface Hits {
-  handles: BigUint64Array;
-  /** Of `nearest`: lengths. Of `castRay`: lengths of the direction. 0 for a body around the point or origin. */
-  distances: Float32Array;
-}
-";
-
 /// Bodies with handles, the pairs of those that overlap, and queries.
 ///
 /// Set the bodies that moved, then `update`. Bodies that are not set cost nothing. Every call takes effect at the next
@@ -50,12 +40,6 @@ fn hits(found: &[(Handle, f32)]) -> JsValue {
     let distances: Vec<f32> = found.iter().map(|hit| hit.1).collect();
     let handles = bits(found.iter().map(|hit| hit.0));
     object([("handles", handles.into()), ("distances", Float32Array::from(&distances[..]).into())])
-}
-
-impl Default for WebSpace {
-    fn default() -> Self {
-        Self(RefCell::new(Space::new()))
-    }
 }
 
 #[wasm_bindgen(js_class = Space)]
