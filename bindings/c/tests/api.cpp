@@ -336,6 +336,7 @@ void callbacks() {
     DO(space.remove(three));
     DO(space.set_limit(30));
     FAILS(space.update(), SW_TOO_MANY_PAIRS);
+    CHECK(std::string(sw_last_error()).find("limit of 30; raise it with sw_space_set_limit") != std::string::npos);
     DO(space.set_limit(0));
     DO(space.update());
     DO(space.remove(handles));
