@@ -1,6 +1,6 @@
 //! Boxes in the memory of a caller.
 
-use crate::{Failure, call, check, put, slice, sw_status, sw_status::*};
+use crate::{Failure, call, check, put, sw_status, sw_status::*};
 use sapwise::{Aabb, Error};
 use std::marker::PhantomData;
 
@@ -10,24 +10,15 @@ type Corner = [f32; 3];
 // An `Aabb` is six floats, minimum then maximum, and nothing else.
 const _: () = assert!(size_of::<Aabb>() == 24 && align_of::<Aabb>() == 4 && std::mem::offset_of!(Aabb, max) == 12);
 
-/// Borrows a box of a caller: six floats, minimum then maximum.
+/// Borrows a box of a caller, whose six floats are its minimum, then its maximum; or a point or a vector.
 ///
 /// # Safety
-/// `bounds` is NULL, misaligned, or points to six floats.
-pub(crate) unsafe fn one<'a>(bounds: *const f32, what: &str) -> Result<&'a Aabb, Failure> {
-    check(bounds, 1, what)?;
-    // SAFETY: of the caller. Every bit pattern is a float.
-    Ok(unsafe { &*bounds.cast() })
-}
-
-/// Reads a point or a vector of a caller.
-///
-/// # Safety
-/// As [`one`], with three floats.
-pub(crate) unsafe fn corner(floats: *const f32, what: &str) -> Result<Corner, Failure> {
-    check(floats, 1, what)?;
-    // SAFETY: of the caller.
-    Ok(unsafe { *floats.cast() })
+/// `numbers` is NULL, misaligned, or points to the numbers of which a `T` consists.
+pub(crate) unsafe fn read<'a, N, T>(numbers: *const N, what: &str) -> Result<&'a T, Failure> {
+    const { assert!(align_of::<N>() == align_of::<T>()) };
+    check(numbers, 1, what)?;
+    // SAFETY: of the caller. Every bit pattern is a number.
+    Ok(unsafe { &*numbers.cast() })
 }
 
 /// Boxes that lie `stride` bytes apart: each with its maximum behind its minimum, or with the maxima in an array of
@@ -108,11 +99,7 @@ impl<'a> Boxes<'a> {
 pub unsafe extern "C-unwind" fn sw_box_from_doubles(min: *const f64, max: *const f64, bounds: *mut f32) -> sw_status {
     call(|| {
         // SAFETY: of the caller.
-        unsafe {
-            let (min, max) = (slice(min, 3, "min")?, slice(max, 3, "max")?);
-            let corner = |of: &[f64]| [of[0], of[1], of[2]];
-            put(bounds.cast(), Aabb::from_f64(corner(min), corner(max)), "bounds")
-        }
+        unsafe { put(bounds.cast(), Aabb::from_f64(*read(min, "min")?, *read(max, "max")?), "bounds") }
     })
 }
 
@@ -124,7 +111,7 @@ pub unsafe extern "C-unwind" fn sw_box_sweep(bounds: *mut f32, motion: *const f3
     call(|| {
         // SAFETY: of the caller.
         unsafe {
-            let swept = one(bounds, "bounds")?.swept(corner(motion, "motion")?);
+            let swept = read::<_, Aabb>(bounds, "bounds")?.swept(*read(motion, "motion")?);
             put(bounds.cast(), swept, "bounds")
         }
     })

@@ -16,7 +16,7 @@ mod status;
 mod text;
 
 use arrays::{check, flat, put, slice};
-use boxes::{Boxes, one};
+use boxes::{Boxes, read};
 use guarded::Guarded;
 use status::{Failure, call, value};
 

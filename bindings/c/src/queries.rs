@@ -1,8 +1,7 @@
 //! Queries of a space.
 
 use crate::arrays::with_handle;
-use crate::boxes::corner;
-use crate::{Boxes, Failure, call, one, put, sw_body, sw_space, sw_status};
+use crate::{Boxes, Failure, call, put, read, sw_body, sw_space, sw_status};
 use sapwise::{Handle, Ray, View};
 use std::ffi::{c_int, c_void};
 
@@ -67,7 +66,7 @@ pub unsafe extern "C-unwind" fn sw_space_query_box(
     unsafe {
         query(space, by, |view| {
             let found = each(found, user)?;
-            Ok(view.query_box(one(bounds, "bounds")?, found)?)
+            Ok(view.query_box(read(bounds, "bounds")?, found)?)
         })
     }
 }
@@ -114,7 +113,7 @@ pub unsafe extern "C-unwind" fn sw_space_query_point(
     unsafe {
         query(space, by, |view| {
             let found = each(found, user)?;
-            Ok(view.query_point(corner(point, "point")?, found)?)
+            Ok(view.query_point(*read(point, "point")?, found)?)
         })
     }
 }
@@ -144,10 +143,10 @@ pub unsafe extern "C-unwind" fn sw_space_cast_ray(
 }
 
 /// # Safety
-/// As [`corner`].
+/// As [`read`].
 unsafe fn ray(origin: *const f32, direction: *const f32, max: f32) -> Result<Ray, Failure> {
     // SAFETY: of the caller.
-    let (origin, direction) = unsafe { (corner(origin, "origin")?, corner(direction, "direction")?) };
+    let (origin, direction) = unsafe { (*read(origin, "origin")?, *read(direction, "direction")?) };
     Ok(Ray { max, ..Ray::new(origin, direction) })
 }
 
@@ -193,7 +192,7 @@ pub unsafe extern "C-unwind" fn sw_space_cast_box(
     // SAFETY: of the caller.
     unsafe {
         query(space, by, |view| {
-            let (hit, bounds, motion) = (given(hit)?, one(bounds, "bounds")?, corner(motion, "motion")?);
+            let (hit, bounds, motion) = (given(hit)?, read(bounds, "bounds")?, *read(motion, "motion")?);
             Ok(view.cast_box(bounds, motion, |handle, t| hit(user, handle.to_bits(), t))?)
         })
     }
@@ -216,7 +215,7 @@ pub unsafe extern "C-unwind" fn sw_space_nearest(
     unsafe {
         query(space, by, |view| {
             let near = given(near)?;
-            let nearest = view.nearest(corner(point, "point")?, k)?;
+            let nearest = view.nearest(*read(point, "point")?, k)?;
             nearest.iter().take_while(|(handle, distance)| near(user, handle.to_bits(), *distance) != 0).for_each(drop);
             Ok(())
         })

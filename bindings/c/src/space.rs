@@ -3,7 +3,7 @@
 use crate::arrays::{handle, handles, with_handle};
 use crate::status::stale;
 use crate::{
-    Boxes, Failure, Guarded, SW_MEASURE, call, check, flat, guarded, one, put, save, slice, sw_body, sw_options,
+    Boxes, Failure, Guarded, SW_MEASURE, call, check, flat, guarded, put, read, save, slice, sw_body, sw_options,
     sw_status, text, value,
 };
 use sapwise::{Aabb, Body, Error, Handle, Space};
@@ -154,7 +154,7 @@ pub unsafe extern "C-unwind" fn sw_space_insert(
     unsafe {
         with_handle(handle, || {
             sw_space::change(space, |space| {
-                let new = space.insert(*one(bounds, "bounds")?, sw_body::or_default(body)?)?;
+                let new = space.insert(*read(bounds, "bounds")?, sw_body::or_default(body)?)?;
                 put(handle, new.to_bits(), "handle")
             })
         })
@@ -234,7 +234,7 @@ unsafe fn insert_boxes(
 #[unsafe(no_mangle)]
 pub unsafe extern "C-unwind" fn sw_space_set(space: *mut sw_space, handle: u64, bounds: *const f32) -> sw_status {
     // SAFETY: of the caller.
-    unsafe { sw_space::change(space, |space| Ok(space.set(self::handle(handle)?, *one(bounds, "bounds")?)?)) }
+    unsafe { sw_space::change(space, |space| Ok(space.set(self::handle(handle)?, *read(bounds, "bounds")?)?)) }
 }
 
 /// Sets the boxes of n bodies. Reads them where they lie. Errors as sw_space_set, for the first wrong one; then none

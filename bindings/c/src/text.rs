@@ -24,8 +24,7 @@ pub(crate) unsafe fn read<'a>(text: *const c_char, what: &str) -> Result<Option<
 /// There are `size` bytes at `to`, or it is NULL.
 pub(crate) unsafe fn write(text: &str, to: *mut c_char, size: usize) -> Result<usize, Failure> {
     if size > 0 {
-        let most = text.len().min(size - 1);
-        let fits = (0..=most).rev().find(|&len| text.is_char_boundary(len)).unwrap_or(0);
+        let fits = text.floor_char_boundary(size - 1);
         // For NULL.
         // SAFETY: of the caller.
         unsafe { put(to, 0, "text") }?;
