@@ -3,7 +3,7 @@
 use crate::ground::{Ground, Grounded};
 use crate::naive::Naive;
 use crate::obvhs_tree::{Moving, Obvhs};
-use crate::parry::{Leaving, Margin, ParallelParry, Parry, Upkeep};
+use crate::parry::{Leaving, Margin, Parry, Upkeep};
 use crate::rtree::{Packed, Rtree};
 use obvhs::bvh2::Bvh2;
 use parry3d::partitioning::Bvh;
@@ -23,11 +23,6 @@ pub(crate) enum Side {
     Peer,
 }
 
-enum Algorithm {
-    Adaptive(Box<Adaptive>),
-    Other(Box<dyn BroadPhase>),
-}
-
 /// One that takes part.
 pub(crate) struct Contestant {
     pub(crate) name: String,
@@ -38,13 +33,16 @@ pub(crate) struct Contestant {
     pub(crate) most: usize,
     /// Hopeless frames in a row, up to the last one.
     pub(crate) hopeless_frames: u32,
-    algorithm: Algorithm,
+    algorithm: Box<dyn BroadPhase>,
 }
 
 impl Contestant {
+    fn new(name: &str, side: Side, keeps: bool, most: usize, algorithm: Box<dyn BroadPhase>) -> Self {
+        Self { name: name.to_owned(), side, keeps, most, hopeless_frames: 0, algorithm }
+    }
+
     fn peer(name: &str, keeps: bool, most: usize, algorithm: impl BroadPhase + 'static) -> Self {
-        let algorithm = Algorithm::Other(Box::new(algorithm));
-        Self { name: name.to_owned(), side: Side::Peer, keeps, most, hopeless_frames: 0, algorithm }
+        Self::new(name, Side::Peer, keeps, most, Box::new(algorithm))
     }
 
     /// The same with a tree for the boxes that are declared fixed.
@@ -71,17 +69,13 @@ impl Contestant {
         };
         let algorithm = registry.create(id)?;
         let keeps = algorithm.is_incremental();
-        let algorithm = Algorithm::Other(algorithm);
-        Ok(Self { name: id.to_string(), side: Side::Fixed, keeps, most, hopeless_frames: 0, algorithm })
+        Ok(Self::new(&id.to_string(), Side::Fixed, keeps, most, algorithm))
     }
 
     /// # Errors
     /// Whatever keeps it from finding the pairs.
     pub(crate) fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
-        match &mut self.algorithm {
-            Algorithm::Adaptive(adaptive) => adaptive.find_pairs(boxes, pairs),
-            Algorithm::Other(algorithm) => algorithm.find_pairs(boxes, pairs),
-        }
+        self.algorithm.find_pairs(boxes, pairs)
     }
 }
 
@@ -90,15 +84,8 @@ impl Contestant {
 /// # Errors
 /// When one of them can't be made.
 pub(crate) fn ours(registry: &Registry, tuning: &Tuning) -> Result<Vec<Contestant>, Error> {
-    let adaptive = Algorithm::Adaptive(Box::new(Adaptive::new(tuning.clone(), registry)?));
-    let mut all = vec![Contestant {
-        name: "adaptive".to_owned(),
-        side: Side::Adaptive,
-        keeps: true,
-        most: usize::MAX,
-        hopeless_frames: 0,
-        algorithm: adaptive,
-    }];
+    let adaptive = Box::new(Adaptive::new(tuning.clone(), registry)?);
+    let mut all = vec![Contestant::new("adaptive", Side::Adaptive, true, usize::MAX, adaptive)];
     for id in registry.available().into_iter().map(|e| e.id) {
         all.push(Contestant::fixed(&id, registry)?);
     }
@@ -111,14 +98,14 @@ pub(crate) fn peers(pool: Option<&Arc<ThreadPool>>, scenario: Scenario) -> Vec<C
     // Trees that take long for many boxes that move. In `city` few do.
     let most = if scenario == Scenario::City { all } else { 100_000 };
     let mut peers = vec![
-        Contestant::grounded::<Bvh>("parry3d refit", true, all, Parry::new(Upkeep::Refit)),
-        Contestant::grounded::<Bvh>("parry3d optimise", true, all, Parry::new(Upkeep::Optimise)),
+        Contestant::grounded::<Bvh>("parry3d refit", true, all, Parry::new(Upkeep::Refit, None)),
+        Contestant::grounded::<Bvh>("parry3d optimise", true, all, Parry::new(Upkeep::Optimise, None)),
         Contestant::grounded::<Bvh>("parry3d margin", true, all, Margin::new(Leaving::Stays)),
         Contestant::grounded::<Bvh>("parry3d reinsert", true, all, Margin::new(Leaving::Reinserted)),
     ];
     match pool {
         None => peers.extend([
-            Contestant::grounded::<Bvh>("parry3d rebuild", false, all, Parry::new(Upkeep::Rebuild)),
+            Contestant::grounded::<Bvh>("parry3d rebuild", false, all, Parry::new(Upkeep::Rebuild, None)),
             Contestant::grounded::<Bvh2>("obvhs rebuild", false, most, Obvhs::rebuilding(None)),
             Contestant::grounded::<Bvh2>("obvhs refit", true, most, Obvhs::refitting()),
             Contestant::grounded::<Bvh2>("obvhs move", true, most, Moving::new()),
@@ -127,9 +114,9 @@ pub(crate) fn peers(pool: Option<&Arc<ThreadPool>>, scenario: Scenario) -> Vec<C
         ]),
         // Without a tree for fixed boxes: `city` runs on one thread.
         Some(pool) => peers.extend([
-            Contestant::peer("parry3d refit (2 threads)", true, all, ParallelParry::new(Upkeep::Refit, pool)),
-            Contestant::peer("parry3d optimise (2 threads)", true, all, ParallelParry::new(Upkeep::Optimise, pool)),
-            Contestant::peer("parry3d rebuild (2 threads)", false, all, ParallelParry::new(Upkeep::Rebuild, pool)),
+            Contestant::peer("parry3d refit (2 threads)", true, all, Parry::new(Upkeep::Refit, Some(pool))),
+            Contestant::peer("parry3d optimise (2 threads)", true, all, Parry::new(Upkeep::Optimise, Some(pool))),
+            Contestant::peer("parry3d rebuild (2 threads)", false, all, Parry::new(Upkeep::Rebuild, Some(pool))),
             Contestant::peer("obvhs rebuild (2 threads)", false, most, Obvhs::rebuilding(Some(pool))),
         ]),
     }

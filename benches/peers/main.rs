@@ -13,7 +13,7 @@
 //! | `SAPWISE_CONTESTANTS` | who takes part: `adaptive,bvh,parry3d refit`; `bvh` is `bvh@cpu1` and `bvh@cpu2` |
 //! | `SAPWISE_BENCH_SECONDS` | time for the timed frames of a scenario at a size `[default: 6]` |
 //! | `SAPWISE_TAIL_SECONDS` | time for the slowest frames of a scenario at a size, 0 for none `[default: 30]` |
-//! | `SAPWISE_RESULTS` | folder for `peers.csv`; without it the ratios are printed |
+//! | `SAPWISE_RESULTS` | folder for `peers.csv`, which alone has the slowest frames |
 //!
 //! Method and bias stand at the head of `BENCHMARKS.md`. Prints a line for each scenario and size as soon as it is
 //! measured. Criterion times its candidates one after the other, which is why it is not used here. Without `--bench`,
@@ -21,13 +21,6 @@
 //! when a contestant failed or found other pairs than the rest.
 
 mod contestants;
-#[allow(
-    unused_imports,
-    dead_code,
-    reason = "its tests run with the command: without a harness there are none, and no checks of days"
-)]
-#[path = "../../probes/src/date.rs"]
-mod date;
 mod ground;
 mod machine;
 mod naive;
@@ -125,18 +118,12 @@ fn bench() -> Result<(), String> {
     let settings = Settings::from_environment()?;
     let keep = |compared: &[(u32, Vec<Point>)]| {
         let Some(folder) = &settings.results else { return Ok(()) };
-        let put = |name: &str, text: String| {
-            let path = folder.join(name);
-            std::fs::write(&path, text).map_err(|e| format!("{}: {e}", path.display()))
-        };
-        put("peers.csv", table::csv(compared))
+        let path = folder.join("peers.csv");
+        std::fs::write(&path, table::csv(compared)).map_err(|e| format!("{}: {e}", path.display()))
     };
     let mut compared = Vec::new();
     for &threads in &settings.threads {
         compare(threads, &settings, &mut compared, keep)?;
-    }
-    if settings.results.is_none() {
-        println!("\n{}", table::summary(&compared));
     }
     Ok(())
 }

@@ -19,11 +19,15 @@ pub(crate) enum Upkeep {
     Rebuild,
 }
 
-/// The leaves updated, the tree kept up, then traversed against itself.
+/// The leaves updated, the tree kept up, then traversed against itself. On a pool the updates, the refit and the
+/// traversal run in their parallel form; `optimize_incremental` and `rebuild` have none.
 pub(crate) struct Parry {
     upkeep: Upkeep,
+    pool: Option<Arc<ThreadPool>>,
     tree: Bvh,
     workspace: BvhWorkspace,
+    updates: Vec<(Bounds, u32, f32)>,
+    statuses: Vec<BvhLeafUpdateStatus>,
 }
 
 fn bounds(b: &Aabb) -> Bounds {
@@ -62,71 +66,49 @@ impl Upkeep {
 }
 
 impl Parry {
-    pub(crate) fn new(upkeep: Upkeep) -> Self {
-        Self { upkeep, tree: Bvh::new(), workspace: BvhWorkspace::default() }
+    pub(crate) fn new(upkeep: Upkeep, pool: Option<&Arc<ThreadPool>>) -> Self {
+        let (tree, workspace) = (Bvh::new(), BvhWorkspace::default());
+        Self { upkeep, pool: pool.cloned(), tree, workspace, updates: Vec::new(), statuses: Vec::new() }
+    }
+
+    fn update(&mut self, boxes: &[Aabb]) {
+        resize(&mut self.tree, boxes, self.upkeep.few(boxes.len()));
+        let parallel = self.pool.is_some();
+        if parallel {
+            let updates = boxes.par_iter().enumerate().map(|(k, b)| (bounds(b), k as u32, 0.0));
+            updates.collect_into_vec(&mut self.updates);
+            self.tree.insert_or_update_batch_partially_parallel(&self.updates, &mut self.statuses);
+        } else {
+            for (k, b) in (0..).zip(boxes) {
+                self.tree.insert_or_update_partially(bounds(b), k, 0.0);
+            }
+        }
+        if let Upkeep::Optimise = self.upkeep {
+            self.tree.optimize_incremental(&mut self.workspace);
+        }
+        match self.upkeep {
+            Upkeep::Rebuild => self.tree.rebuild(&mut self.workspace, BvhBuildStrategy::Binned),
+            _ if parallel => self.tree.refit_parallel(&mut self.workspace),
+            // The nodes stay where they are, so that there is nothing to gain from sorting them again.
+            Upkeep::Refit => self.tree.refit_without_opt(),
+            Upkeep::Optimise => self.tree.refit(&mut self.workspace),
+        }
     }
 }
 
 impl BroadPhase for Parry {
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
         pairs.clear();
-        resize(&mut self.tree, boxes, self.upkeep.few(boxes.len()));
-        for (k, b) in (0..).zip(boxes) {
-            self.tree.insert_or_update_partially(bounds(b), k, 0.0);
+        if let Some(pool) = self.pool.clone() {
+            let found = pool.install(|| {
+                self.update(boxes);
+                self.tree.traverse_bvtt_single_tree_parallel::<false>()
+            });
+            found.into_iter().for_each(|(a, b)| pairs.push(a, b));
+        } else {
+            self.update(boxes);
+            self.tree.traverse_bvtt_single_tree::<false>(&mut self.workspace, &mut |a, b| pairs.push(a, b));
         }
-        match self.upkeep {
-            // The nodes stay where they are, so that there is nothing to gain from sorting them again.
-            Upkeep::Refit => self.tree.refit_without_opt(),
-            Upkeep::Optimise => {
-                self.tree.optimize_incremental(&mut self.workspace);
-                self.tree.refit(&mut self.workspace);
-            }
-            Upkeep::Rebuild => self.tree.rebuild(&mut self.workspace, BvhBuildStrategy::Binned),
-        }
-        self.tree.traverse_bvtt_single_tree::<false>(&mut self.workspace, &mut |a, b| pairs.push(a, b));
-        pairs.finish()
-    }
-}
-
-/// [`Parry`] on a pool: updates, refit and traversal have a parallel form, `optimize_incremental` and `rebuild` have
-/// none.
-pub(crate) struct ParallelParry {
-    upkeep: Upkeep,
-    pool: Arc<ThreadPool>,
-    tree: Bvh,
-    workspace: BvhWorkspace,
-    updates: Vec<(Bounds, u32, f32)>,
-    statuses: Vec<BvhLeafUpdateStatus>,
-}
-
-impl ParallelParry {
-    pub(crate) fn new(upkeep: Upkeep, pool: &Arc<ThreadPool>) -> Self {
-        let (pool, tree, workspace) = (Arc::clone(pool), Bvh::new(), BvhWorkspace::default());
-        Self { upkeep, pool, tree, workspace, updates: Vec::new(), statuses: Vec::new() }
-    }
-
-    fn frame(&mut self, boxes: &[Aabb]) -> Vec<(u32, u32)> {
-        resize(&mut self.tree, boxes, self.upkeep.few(boxes.len()));
-        let updates = boxes.par_iter().enumerate().map(|(k, b)| (bounds(b), k as u32, 0.0));
-        updates.collect_into_vec(&mut self.updates);
-        self.tree.insert_or_update_batch_partially_parallel(&self.updates, &mut self.statuses);
-        match self.upkeep {
-            Upkeep::Refit => self.tree.refit_parallel(&mut self.workspace),
-            Upkeep::Optimise => {
-                self.tree.optimize_incremental(&mut self.workspace);
-                self.tree.refit_parallel(&mut self.workspace);
-            }
-            Upkeep::Rebuild => self.tree.rebuild(&mut self.workspace, BvhBuildStrategy::Binned),
-        }
-        self.tree.traverse_bvtt_single_tree_parallel::<false>()
-    }
-}
-
-impl BroadPhase for ParallelParry {
-    fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
-        pairs.clear();
-        let pool = Arc::clone(&self.pool);
-        pool.install(|| self.frame(boxes)).into_iter().for_each(|(a, b)| pairs.push(a, b));
         pairs.finish()
     }
 }
