@@ -30,6 +30,7 @@ use sapwise::algorithm::{Backend, usable_cores};
 use sapwise::{Aabb, AlgorithmId, BroadPhase, Pairs, Registry};
 use sapwise_gpu::{Gpu, Gpus, Resident, ResidentPairs, wgpu30 as wgpu};
 use sapwise_scenes::Scenario;
+use sapwise_tune::stats::quantile;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::hint::black_box;
@@ -163,8 +164,7 @@ fn upload(gpu: &Gpu, boxes: &[Aabb], last: Option<wgpu::Buffer>) -> Result<wgpu:
         Some(buffer) if buffer.size() >= size => buffer,
         _ => {
             let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
-            let descriptor = wgpu::BufferDescriptor { label: Some("boxes"), size, usage, mapped_at_creation: false };
-            gpu.try_make(|device| device.create_buffer(&descriptor)).map_err(|e| e.to_string())?
+            buffer(gpu, size, usage)?
         }
     };
     for (piece, at) in boxes.chunks(1 << 20).zip(0_u64..) {
@@ -203,15 +203,10 @@ fn on_gpus(registry: &Registry) -> Result<Vec<AlgorithmId>, String> {
     Ok(wanted)
 }
 
-/// Returns the first quartile, the median and the third quartile, interpolated.
-fn quartiles(samples: &[f64]) -> [f64; 3] {
-    let mut sorted = samples.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    [0.25, 0.5, 0.75].map(|share| {
-        let at = share * (sorted.len() - 1) as f64;
-        let (low, high) = (sorted[at.floor() as usize], sorted[at.ceil() as usize]);
-        low + (high - low) * at.fract()
-    })
+/// Makes a buffer.
+fn buffer(gpu: &Gpu, size: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer, String> {
+    let descriptor = wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false };
+    gpu.try_make(|device| device.create_buffer(&descriptor)).map_err(|e| e.to_string())
 }
 
 /// Returns the frames of a size.
@@ -274,18 +269,13 @@ fn measure(objects: usize, rounds: usize, contestants: &mut [Contestant], remark
     // The last contestant on the CPU has the most cores.
     let reference = racing.iter().rfind(|c| matches!(c.id.backend(), Backend::Cpu(_))).map(|c| c.seconds.clone());
     for contestant in racing {
-        let [low, median, high] = quartiles(&contestant.seconds);
+        let [low, median, high] = [0.25, 0.5, 0.75].map(|q| quantile(&contestant.seconds, q).unwrap_or(f64::NAN));
         let speed_up = reference.as_ref().map_or("-".to_owned(), |reference| {
             let ratios: Vec<f64> = reference.iter().zip(&contestant.seconds).map(|(r, s)| r / s).collect();
-            format!("{:.3}", quartiles(&ratios)[1])
+            format!("{:.3}", quantile(&ratios, 0.5).unwrap_or(f64::NAN))
         });
-        let tests = if contestant.id.method() == "brute" {
-            format!("{:.3}", objects as f64 * (objects as f64 - 1.0) / 2.0 / median / 1e9)
-        } else {
-            "-".to_owned()
-        };
         println!(
-            "| {objects} | {} | {} | {:.3} | {:.3} to {:.3} | {} | {speed_up} | {tests} |",
+            "| {objects} | {} | {} | {:.3} | {:.3} to {:.3} | {} | {speed_up} |",
             contestant.id,
             contestant.memory,
             median * 1e3,
@@ -354,9 +344,8 @@ fn bench() -> Result<Vec<String>, String> {
         }
     }
     println!(
-        "\n| objects | algorithm | memory | median ms | quartiles ms | frames | times grid-sap@cpu{} \
-         | G box tests/s |\n\
-         |---|---|---|---|---|---|---|---|",
+        "\n| objects | algorithm | memory | median ms | quartiles ms | frames | times grid-sap@cpu{} |\n\
+         |---|---|---|---|---|---|---|",
         usable_cores()
     );
     let full = words.iter().any(|word| word == "--bench");

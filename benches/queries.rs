@@ -19,6 +19,7 @@ use rustix::time::{ClockId, clock_gettime};
 use sapwise::Aabb;
 use sapwise::internals::{Ray, Tree, splitmix};
 use sapwise_scenes::Scenario;
+use sapwise_tune::stats::median;
 use std::hint::black_box;
 use std::time::Duration;
 
@@ -263,13 +264,7 @@ fn race(label: &str, contestants: &[Box<dyn Contestant>], run: &dyn Fn(&dyn Cont
             taken[at].push((cpu_ns() - begin) / QUERIES as f64);
         }
     }
-    let medians: Vec<f64> = taken
-        .iter_mut()
-        .map(|times| {
-            times.sort_by(f64::total_cmp);
-            times[ROUNDS / 2]
-        })
-        .collect();
+    let medians: Vec<f64> = taken.iter().filter_map(|times| median(times)).collect();
     let fastest = medians[1..].iter().copied().fold(f64::INFINITY, f64::min);
     print!("{label}, {:.2} found a query:", expected.0 as f64 / QUERIES as f64);
     contestants.iter().zip(&medians).for_each(|(c, ns)| print!(" {} {ns:.0} ns,", c.name()));

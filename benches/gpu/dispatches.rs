@@ -6,6 +6,7 @@ use sapwise_gpu::{Gpu, Gpus, Resident, broad_phase, wgpu30 as wgpu};
 use sapwise_scenes::Scenario;
 use sapwise_tune::GpuParameterId;
 use sapwise_tune::measure::Options;
+use sapwise_tune::stats::median;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -97,7 +98,7 @@ impl Clock {
     /// Returns the first timestamps, in seconds.
     fn read(&self, count: u64) -> Result<Vec<f64>, String> {
         use wgpu::BufferUsages as U;
-        let resolved = buffer(&self.plain, count * 8, U::QUERY_RESOLVE | U::COPY_SRC);
+        let resolved = super::buffer(&self.plain, count * 8, U::QUERY_RESOLVE | U::COPY_SRC)?;
         let mut encoder = self.plain.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         encoder.resolve_query_set(&self.queries, 0..count as u32, &resolved, 0);
         self.plain.queue().submit([encoder.finish()]);
@@ -105,15 +106,6 @@ impl Clock {
         let period = f64::from(self.plain.queue().get_timestamp_period()) * 1e-9;
         Ok(words.chunks_exact(2).map(|w| (u64::from(w[1]) << 32 | u64::from(w[0])) as f64 * period).collect())
     }
-}
-
-fn buffer(gpu: &Gpu, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
-    gpu.device().create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
-}
-
-fn median(samples: &mut [f64]) -> f64 {
-    samples.sort_by(f64::total_cmp);
-    samples.get(samples.len() / 2).copied().unwrap_or_default()
 }
 
 /// Returns the fewest bytes that the dispatches of a kernel read and write in a frame: whole sectors of 32 bytes where
@@ -186,8 +178,8 @@ fn table(
     for (name, count, seconds) in by_name(&on_cpu) {
         println!("| CPU: {name} | {count} | {:.1} | | | |", seconds * 1e6);
     }
-    println!("| **wall** | | {:.1} | | | |", median(&mut walls) * 1e6);
-    println!("| **wall without timestamps** | | {:.1} | | | |", median(&mut plain) * 1e6);
+    println!("| **wall** | | {:.1} | | | |", median(&walls).unwrap_or_default() * 1e6);
+    println!("| **wall without timestamps** | | {:.1} | | | |", median(&plain).unwrap_or_default() * 1e6);
     Ok(())
 }
 
@@ -201,8 +193,8 @@ fn by_name(frames: &[Parts]) -> Vec<(&'static str, u32, f64)> {
     }
     let of = |name| {
         let parts = |frame: &Parts| frame.iter().filter(|p| p.0 == name).map(|p| p.1).collect::<Vec<f64>>();
-        let mut sums: Vec<f64> = frames.iter().map(|frame| parts(frame).iter().sum()).collect();
-        (name, frames.last().map_or(0, |frame| parts(frame).len() as u32), median(&mut sums))
+        let sums: Vec<f64> = frames.iter().map(|frame| parts(frame).iter().sum()).collect();
+        (name, frames.last().map_or(0, |frame| parts(frame).len() as u32), median(&sums).unwrap_or_default())
     };
     names.into_iter().map(of).collect()
 }

@@ -26,8 +26,7 @@ pub(super) fn print(gpus: &Gpus, index: u32, sizes: &[usize], folder: &Path) -> 
         }
         let bytes = size as u64 * size_of::<sapwise::Aabb>() as u64;
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
-        let descriptor = wgpu::BufferDescriptor { label: Some("boxes"), size: bytes, usage, mapped_at_creation: false };
-        let boxes = gpu.try_make(|device| device.create_buffer(&descriptor)).map_err(|e| e.to_string())?;
+        let boxes = super::buffer(&gpu, bytes, usage)?;
         let stored = frames.iter().map(|frame| super::upload(&gpu, frame, None));
         let stored = stored.collect::<Result<Vec<wgpu::Buffer>, String>>()?;
         let load = |at: usize| {
