@@ -9,7 +9,7 @@ use std::fs;
 
 #[test]
 fn wrong_usage_is_exit_status_two() {
-    let cases: [&[&str]; 13] = [
+    let cases: [&[&str]; 14] = [
         &[],
         &["fly"],
         &["devices", "--fast"],
@@ -23,6 +23,7 @@ fn wrong_usage_is_exit_status_two() {
         &["predict", "--no-gpus", "--software-gpus"],
         &["pairs", "x.npy", "--no-gpus"],
         &["probe", "--hardware-only", "--quick"],
+        &["study", "report.json"],
     ];
     for words in cases {
         failure(sapwise().args(words), 2, &[]);
@@ -103,14 +104,11 @@ fn bad_boxes_are_told_with_file_frame_and_position() {
     nan[20] = f32::NAN;
     let inverted = [[5.0_f32, 0.0, 0.0, 1.0, 1.0, 1.0], good].concat();
     let crowd = good.repeat(50);
-    let path = |name, dtype, shape, data: &[f32]| npy(folder.path(), name, dtype, shape, data);
-    let cases: [(_, &[&str], &[&str]); 7] = [
-        (path("nan.npy", "<f4", "2, 2, 6", &nan), &[], &["nan.npy", "frame 1", "box 1", "NaN"]),
-        (path("inverted.npy", "<f4", "2, 6", &inverted), &[], &["inverted.npy", "frame 0", "box 0", "inverted"]),
-        (path("big.npy", ">f4", "1, 6", &good), &[], &["big.npy", "big-endian"]),
-        (path("flat.npy", "<f4", "6,", &good), &[], &["flat.npy", "shape"]),
-        (path("short.npy", "<f4", "2, 6", &good), &[], &["short.npy", "truncated"]),
-        (path("crowd.npy", "<f4", "50, 6", &crowd), &["--limit", "100"], &["crowd.npy", "frame 0", "limit of 100"]),
+    let path = |name, shape, data: &[f32]| npy(folder.path(), name, "<f4", shape, data);
+    let cases: [(_, &[&str], &[&str]); 4] = [
+        (path("nan.npy", "2, 2, 6", &nan), &[], &["nan.npy", "frame 1", "box 1", "NaN"]),
+        (path("inverted.npy", "2, 6", &inverted), &[], &["inverted.npy", "frame 0", "box 0", "inverted"]),
+        (path("crowd.npy", "50, 6", &crowd), &["--limit", "100"], &["crowd.npy", "frame 0", "limit of 100"]),
         (folder.path().join("absent.npy"), &[], &["absent.npy"]),
     ];
     for (file, options, expected) in cases {

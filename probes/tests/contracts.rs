@@ -87,16 +87,6 @@ fn a_measured_tuning_comes_from_the_report_alone() {
     assert_tuning(&tuning, "measured");
     assert_eq!(tuning["model"], Value::Null);
     failure(&mut measured(&["--scenario", "gravity"]), 1, &["gravity", "it holds: "]);
-    failure(sapwise().args(["predict", "--measured"]), 2, &[]);
-}
-
-#[test]
-fn train_refuses_timings_of_an_unoptimised_build() {
-    let folder = tempfile::tempdir().unwrap();
-    let debug = report(folder.path(), "debug.json", &[("/provenance/optimised", false.into())]);
-    let model = folder.path().join("model.json");
-    failure(sapwise().arg("train").arg(debug).arg("--out").arg(&model), 1, &["debug.json", "unoptimised"]);
-    assert!(!model.exists());
 }
 
 #[test]

@@ -4,7 +4,7 @@ mod common;
 
 #[cfg(feature = "long-tests")]
 use common::failure;
-use common::{answer, devices_with_a_gpu, npy, sapwise, success, tuning, without_adapters};
+use common::{answer, devices_with_a_gpu, npy, renew, sapwise, success, tuning, without_adapters};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -22,20 +22,7 @@ fn report(command: &mut assert_cmd::Command) -> sapwise_lab::Report {
 fn made_up(folder: &Path, name: &str, change: impl Fn(&mut Value)) -> PathBuf {
     let mut report: Value =
         serde_json::from_str(include_str!("../../crates/lab/tests/fixtures/report-3-gpu.json")).unwrap();
-    report["label"] = "real_full".into();
-    // The fixture is old; this is a report of this build.
-    let registry = sapwise::Registry::with_cores(1);
-    let any = sapwise_tune::GpuIdentity::new(0, "any", sapwise_tune::GpuKind::Discrete);
-    let of_this_build = [registry.entries(), &sapwise_gpu::algorithms([&any])].concat();
-    for algorithm in report["algorithms"].as_array_mut().unwrap() {
-        let id: sapwise::AlgorithmId = algorithm["id"].as_str().unwrap().parse().unwrap();
-        let same = |e: &&sapwise::algorithm::Entry| {
-            e.id.method() == id.method() && e.id.backend().class() == id.backend().class()
-        };
-        if let Some(revision) = of_this_build.iter().find(same).map(|e| e.revision) {
-            algorithm["revision"] = revision.into();
-        }
-    }
+    renew(&mut report);
     let points = report["points"].as_array().unwrap().clone();
     let again = points.iter().cycle().take(12).enumerate().map(|(k, point)| {
         let mut point = point.clone();

@@ -1,9 +1,8 @@
-//! `sapwise study` on stored reports, and on what is no good report.
+//! `sapwise study` on stored reports.
 
 mod common;
 
-use common::{failure, sapwise, success};
-use serde_json::Value;
+use common::{answer, sapwise};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,8 +16,7 @@ fn a_study_has_a_page_with_figures_and_tidy_tables() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("study");
     let reports = [dataset("intel-xeon-16c/4t.json"), dataset("published")];
-    let answer = success(sapwise().arg("study").args(&reports).arg("--json").arg("--out").arg(&out));
-    let answer: Value = serde_json::from_str(&answer).unwrap();
+    let answer = answer(sapwise().arg("study").args(&reports).arg("--json").arg("--out").arg(&out));
     assert_eq!((&answer["reports"], &answer["studied"], &answer["hosts"]), (&4.into(), &1.into(), &1.into()));
     let page = fs::read_to_string(out.join("index.html")).unwrap();
     assert!(page.contains("Quadro FX 5800") && page.contains("4 threads") && !page.contains("Figure 9: no report"));
@@ -28,15 +26,4 @@ fn a_study_has_a_page_with_figures_and_tidy_tables() {
     assert!(rows.iter().find(is_own).unwrap()["median_ns"].parse::<f64>().unwrap() > 0.0);
     // The folder is of this machine alone.
     assert!(!page.contains(folder.path().to_str().unwrap()));
-}
-
-#[test]
-fn what_can_not_be_studied_is_told_before_the_work() {
-    let folder = tempfile::tempdir().unwrap();
-    let report = dataset("intel-xeon-16c/1t.json");
-    failure(sapwise().arg("study").arg(&report), 2, &["--out"]);
-    let thesis = folder.path().join("thesis.json");
-    fs::write(&thesis, "{\"schema\": ").unwrap();
-    failure(sapwise().arg("study").arg(&report).arg("--out").arg(folder.path()), 1, &["not empty", "--out"]);
-    failure(sapwise().arg("study").arg(&thesis).arg("--out").arg(folder.path().join("new")), 1, &["thesis.json"]);
 }

@@ -11,10 +11,11 @@ pub(crate) fn sapwise() -> Command {
     Command::from_std(program())
 }
 
-/// The same, to be spawned.
+/// The same, to be spawned. A pipe gets no colours, whatever these variables ask for.
 pub(crate) fn program() -> std::process::Command {
     let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
     command.env_remove("SAPWISE_SIMD").env_remove("CARGO");
+    command.env("TERM", "xterm-256color").env("CLICOLOR_FORCE", "1").env("LANG", "C.UTF-8");
     command
 }
 
@@ -22,13 +23,8 @@ pub(crate) fn program() -> std::process::Command {
 pub(crate) fn small_report(machine: &str) -> Value {
     let text = include_str!("../../../crates/lab/tests/fixtures/report-3.json");
     let mut report: Value = serde_json::from_str(text).unwrap();
-    report["label"] = "real_full".into();
+    renew(&mut report);
     report["hardware"]["machine"]["physical_id"] = machine.repeat(16).into();
-    let registry = sapwise::Registry::with_cores(2);
-    for algorithm in report["algorithms"].as_array_mut().unwrap() {
-        let own = registry.entries().iter().find(|e| algorithm["id"] == e.id.to_string().as_str()).unwrap();
-        algorithm["revision"] = own.revision.into();
-    }
     let points = report["points"].as_array().unwrap().clone();
     let scenarios = ["uniform", "slab", "mixed", "fast"].into_iter().flat_map(|scenario| {
         points.iter().cloned().map(move |mut point| {
@@ -39,6 +35,20 @@ pub(crate) fn small_report(machine: &str) -> Value {
     });
     report["points"] = scenarios.collect();
     report
+}
+
+/// Makes an old report one of this build on an undisturbed machine: its label and the revisions of its algorithms.
+pub(crate) fn renew(report: &mut Value) {
+    report["label"] = "real_full".into();
+    let registry = sapwise::Registry::with_cores(1);
+    let any = sapwise_tune::GpuIdentity::new(0, "any", sapwise_tune::GpuKind::Discrete);
+    let of_this_build = [registry.entries(), &sapwise_gpu::algorithms([&any])].concat();
+    for algorithm in report["algorithms"].as_array_mut().unwrap() {
+        let id: sapwise::AlgorithmId = algorithm["id"].as_str().unwrap().parse().unwrap();
+        let kind = |id: &sapwise::AlgorithmId| (id.method().to_owned(), id.backend().class());
+        let own = of_this_build.iter().find(|e| kind(&e.id) == kind(&id)).unwrap();
+        algorithm["revision"] = own.revision.into();
+    }
 }
 
 /// The command on a machine without GPUs: it asks Vulkan only, not Metal or Direct3D, and Vulkan finds no driver.
