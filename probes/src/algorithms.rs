@@ -30,7 +30,6 @@ pub struct UserAlgorithm {
 
 impl UserAlgorithm {
     /// Creates an algorithm that runs on the calling thread alone, as `method@cpu1`.
-    #[must_use]
     pub fn on_one_thread(
         method: &str,
         revision: u32,
@@ -42,7 +41,6 @@ impl UserAlgorithm {
     /// Creates an algorithm that runs on several threads. The factory gets their number, the calling thread included:
     /// 1, 2, 4, ... and all that the machine has or `--threads` allows. The command pins the library's threads to
     /// cores, not those of a user's algorithm.
-    #[must_use]
     pub fn on_threads(
         method: &str,
         revision: u32,
@@ -123,11 +121,12 @@ impl Algorithms {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use sapwise::{Aabb, Pairs};
 
-    struct Nothing;
+    /// Finds no pairs.
+    pub(crate) struct Nothing;
 
     impl BroadPhase for Nothing {
         fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
@@ -175,20 +174,6 @@ mod tests {
         assert_eq!(counts("grid"), [(1, 4), (2, 4), (4, 4), (6, 4)]);
         assert_eq!(counts("brute").len(), 4);
         assert!(registry.create(&"grid@cpu4".parse().unwrap()).is_ok());
-    }
-
-    #[test]
-    fn an_instance_is_made_for_its_number_of_threads() {
-        let mut algorithms = Algorithms::default();
-        let only_four = |threads: u32| match threads {
-            4 => nothing(threads),
-            _ => Err(Error::OutOfMemory { what: "threads", elements: threads as usize }),
-        };
-        algorithms.add(UserAlgorithm::on_threads("grid", 1, only_four)).unwrap();
-        let registry = algorithms.registry(4);
-        assert!(registry.create(&"grid@cpu4".parse().unwrap()).is_ok());
-        let Err(error) = registry.create(&"grid@cpu2".parse().unwrap()) else { panic!("made for another count") };
-        assert!(error.to_string().contains("no memory for 2 threads"), "{error}");
     }
 
     #[test]

@@ -23,7 +23,6 @@ pub struct Command {
 
 impl Command {
     /// Creates the command with the library's algorithms.
-    #[must_use]
     pub fn new() -> Self {
         Self::default()
     }

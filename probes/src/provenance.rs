@@ -57,8 +57,9 @@ pub(crate) fn label(arguments: &Probe, points: &[Point], hardware: &Hardware) ->
         .any(|t| !t.samples_ns.is_empty() && uses(&t.algorithm).iter().any(software));
     let fewer_cores = arguments.threads.is_some_and(|k| k < usable_cores());
     let lower_level = requested_level().is_some_and(|level| level < SimdLevel::detected());
+    let loads: Vec<f64> = points.iter().filter_map(|p| p.foreign_load).collect();
     // First: a restricted machine that is disturbed shows what no restriction explains.
-    if median_foreign_load(points).is_some_and(|load| load > CONTENDED_LOAD) {
+    if median(&loads).is_some_and(|load| load > CONTENDED_LOAD) {
         Label::RealContended
     } else if on_software_gpu {
         Label::RealSoftwareGpu
@@ -92,23 +93,12 @@ fn requested_level() -> Option<SimdLevel> {
     SimdLevel::requested().ok().flatten()
 }
 
-/// Returns the median over the points at which it is known.
-fn median_foreign_load(points: &[Point]) -> Option<f64> {
-    let loads: Vec<f64> = points.iter().filter_map(|p| p.foreign_load).collect();
-    median(&loads)
-}
-
 /// Returns the arguments without `--out`, because paths name users.
 pub(crate) fn command(arguments: &Probe) -> String {
     let mut words = vec!["probe".to_owned()];
-    let flags = [
-        ("--hardware-only", arguments.hardware_only),
-        ("--quick", arguments.quick),
-        ("--no-gpus", arguments.gpus.no_gpus),
-        ("--software-gpus", arguments.gpus.software_gpus),
-    ];
+    let flags = [("--hardware-only", arguments.hardware_only), ("--quick", arguments.quick)];
     words.extend(flags.iter().filter(|f| f.1).map(|f| f.0.to_owned()));
-    words.extend(arguments.gpus.only.iter().map(|k| format!("--gpu {k}")));
+    words.extend(arguments.gpus.words().split_whitespace().map(str::to_owned));
     words.extend(arguments.threads.map(|k| format!("--threads {k}")));
     words.push(format!("--seed {}", arguments.seed));
     words.extend(arguments.max_objects.map(|n| format!("--max-objects {n}")));

@@ -1,7 +1,7 @@
-//! Tests that this program understands the commands in the documents.
+//! Tests that this program understands the commands in the documents and in its own help.
 
 use super::Arguments;
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 
 const DOCUMENTS: [(&str, &str); 10] = [
     ("README.md", include_str!("../../../README.md")),
@@ -48,14 +48,19 @@ fn lines(text: &str) -> Vec<&str> {
 }
 
 #[test]
-fn every_command_of_the_documents_is_understood() {
-    let mut count = 0;
-    for (name, text) in DOCUMENTS {
-        for words in lines(text).into_iter().filter_map(arguments).filter(|words| *words != ["sapwise", "VERB"]) {
-            let parsed = Arguments::try_parse_from(&words);
+fn every_command_of_the_documents_and_of_the_help_is_understood() {
+    let helps = Arguments::command();
+    let helps = helps.get_subcommands().filter_map(|verb| verb.get_after_help());
+    let helps: String = helps.map(|help| format!("```sh\n{help}\n```\n")).collect();
+    let mut counts = Vec::new();
+    for (name, text) in DOCUMENTS.into_iter().chain([("--help", &*helps)]) {
+        let commands = lines(text).into_iter().filter_map(arguments).filter(|words| *words != ["sapwise", "VERB"]);
+        let understood = commands.inspect(|words| {
+            let parsed = Arguments::try_parse_from(words);
             assert!(parsed.is_ok(), "{name}: {}: {}", words.join(" "), parsed.unwrap_err());
-            count += 1;
-        }
+        });
+        counts.push(understood.count());
     }
-    assert!(count >= 40, "{count}");
+    let [documents @ .., helps] = &counts[..] else { panic!("no text") };
+    assert!(documents.iter().sum::<usize>() >= 40 && *helps >= 15, "{counts:?}");
 }

@@ -13,7 +13,7 @@ use sapwise::AlgorithmId;
 use sapwise_scenes::Scenario;
 use std::path::PathBuf;
 
-pub(crate) use part::{Part, PartKind};
+pub(crate) use part::Part;
 pub(crate) use probe::Probe;
 pub(crate) use run::{Run, Scene};
 
@@ -39,7 +39,7 @@ pub(crate) enum Verb {
     Pairs(Pairs),
     Check(Check),
     Schema(Schema),
-    #[command(hide = true)]
+    #[command(subcommand, hide = true)]
     Part(Part),
 }
 
@@ -202,26 +202,4 @@ pub(crate) struct Schema {
     /// Print one JSON object instead of text.
     #[arg(long)]
     pub(crate) json: bool,
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use clap::CommandFactory;
-
-    #[test]
-    fn every_example_of_the_help_is_understood() {
-        let command = Arguments::command();
-        let mut count = 0;
-        for verb in command.get_subcommands() {
-            let help = verb.get_after_help().map(ToString::to_string).unwrap_or_default();
-            for line in help.lines().filter_map(|line| Some(&line[line.find("sapwise ")?..])) {
-                let words = line.split(['#', '>']).next().unwrap_or_default();
-                let parsed = Arguments::try_parse_from(words.split_whitespace());
-                assert!(parsed.is_ok(), "{line}: {}", parsed.unwrap_err());
-                count += 1;
-            }
-        }
-        assert!(count >= 15, "{count}");
-    }
 }

@@ -1,16 +1,10 @@
 //! The arguments of the hidden verb `part`.
 
-use clap::{Args, Subcommand};
+use clap::Subcommand;
 
 /// Runs one part of a measurement in its own process, so that a crash costs that part only.
-#[derive(Debug, Args)]
-pub(crate) struct Part {
-    #[command(subcommand)]
-    pub(crate) part: PartKind,
-}
-
 #[derive(Debug, Subcommand)]
-pub(crate) enum PartKind {
+pub(crate) enum Part {
     /// Prints the GPUs, one as JSON a line.
     Gpus,
     /// Prints the algorithms on all GPUs, one as JSON a line.

@@ -1,6 +1,7 @@
 //! Tests of whole replays.
 
 use super::*;
+use crate::algorithms::tests::Nothing;
 use sapwise::tuning::Step;
 use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Pairs, Reason, Registry, Tuning};
 use sapwise_scenes::Scenario;
@@ -33,15 +34,8 @@ fn a_replay_has_all_times_and_the_choice_of_every_frame() {
 
 #[test]
 fn of_two_that_disagree_the_one_that_a_user_added_is_named() {
-    struct NoPairs;
-    impl BroadPhase for NoPairs {
-        fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
-            pairs.clear();
-            pairs.finish()
-        }
-    }
     let mut registry = Registry::with_cores(1);
-    registry.add("mine@cpu1".parse().unwrap(), 1, || Ok(Box::new(NoPairs)));
+    registry.add("mine@cpu1".parse().unwrap(), 1, || Ok(Box::new(Nothing)));
     // Each seed has another order of turns.
     for seed in 1..=4 {
         let settings = ReplaySettings { seed, ..settings(Scenario::Uniform, 300, 1, 1) };

@@ -28,7 +28,6 @@ const REDO_SHARE: f64 = 2.0 / 3.0;
 pub(crate) struct Racer {
     pub(crate) id: AlgorithmId,
     pub(crate) algorithm: Box<dyn BroadPhase>,
-    is_incremental: bool,
     /// Samples of this point.
     samples: Vec<u64>,
     /// Why it left the race, if it did.
@@ -41,8 +40,7 @@ pub(crate) struct Racer {
 
 impl Racer {
     pub(crate) fn new(id: AlgorithmId, algorithm: Box<dyn BroadPhase>) -> Self {
-        let is_incremental = algorithm.is_incremental();
-        Self { id, algorithm, is_incremental, samples: Vec::new(), error: None, rests: false, answer: None }
+        Self { id, algorithm, samples: Vec::new(), error: None, rests: false, answer: None }
     }
 }
 
@@ -93,7 +91,7 @@ impl Race {
         // The first frame warms buffers, thread pools and branch predictors, and is not counted.
         self.frame(racers, scene, |_| true, &mut mismatches);
         let mut warm_up = Duration::ZERO;
-        let is_incremental = |r: &Racer| r.error.is_none() && r.is_incremental;
+        let is_incremental = |r: &Racer| r.error.is_none() && r.algorithm.is_incremental();
         if racers.iter().any(is_incremental) {
             let frame = || {
                 let started = Instant::now();
@@ -107,19 +105,19 @@ impl Race {
         let (mut spoiled, mut highest) = (0, None);
         let (mut windows, mut thrown) = (0, 0);
         let mut shortest = Duration::MAX;
-        let mut mean_load = MeanLoad::default();
+        let mut loads = Vec::new();
         loop {
             // Samples are kept or thrown away by windows that are long enough to measure foreign load.
             let watch = Watch::begin();
             let mut fresh = 0;
-            let load_before = mean_load;
+            let loads_before = loads.len();
             while fresh == 0 || !watch.is_long_enough() {
                 let started = Instant::now();
                 let pairs_before = self.frame(racers, scene, |r| !r.rests, &mut mismatches);
                 if racers.iter().all(|r| !r.rests) {
                     shortest = shortest.min(started.elapsed());
                 }
-                mean_load.add(&self.load(scene, pairs_before));
+                loads.push(self.load(scene, pairs_before));
                 fresh += 1;
             }
             let foreign = watch.foreign_load();
@@ -134,7 +132,7 @@ impl Race {
                 racer.keep(frames, if redo { 0 } else { kept });
             }
             if redo {
-                mean_load = load_before;
+                loads.truncate(loads_before);
                 spoiled += kept as u32;
                 thrown += 1;
                 continue;
@@ -155,7 +153,7 @@ impl Race {
                 break;
             }
         }
-        let mut point = self.point(racers, scene, mean_load.mean());
+        let mut point = self.point(racers, scene, mean(&loads));
         point.foreign_load = highest;
         point.spoiled = spoiled;
         point.core_to_core_ns = core_to_core.and_then(|before| Some([before, core_to_core_ns(&self.cores)?]));
@@ -234,33 +232,15 @@ impl Race {
     }
 }
 
-/// The mean load of frames with the same number of objects. A single frame may be unlike the others: `teleport` jumps
-/// in every 30th.
-#[derive(Debug, Clone, Copy, Default)]
-struct MeanLoad {
-    frames: f64,
-    sum: Load,
-}
-
-impl MeanLoad {
-    fn add(&mut self, load: &Load) {
-        let sum = &self.sum;
-        self.sum = Load::of_objects(load.objects)
-            .with_pairs(sum.pairs + load.pairs)
-            .with_candidates(sum.axis_candidates + load.axis_candidates, sum.strip_candidates + load.strip_candidates)
-            .with_moved(sum.moved + load.moved)
-            .with_moved_share(sum.moved_share + load.moved_share);
-        self.frames += 1.0;
-    }
-
-    fn mean(&self) -> Load {
-        let Self { frames, sum } = *self;
-        Load::of_objects(sum.objects)
-            .with_pairs(sum.pairs / frames)
-            .with_candidates(sum.axis_candidates / frames, sum.strip_candidates / frames)
-            .with_moved(sum.moved / frames)
-            .with_moved_share(sum.moved_share / frames)
-    }
+/// Returns the mean load of frames with the same number of objects. A single frame may be unlike the others: `teleport`
+/// jumps in every 30th.
+fn mean(loads: &[Load]) -> Load {
+    let mean = |value: fn(&Load) -> f64| loads.iter().map(value).sum::<f64>() / loads.len() as f64;
+    Load::of_objects(loads[0].objects)
+        .with_pairs(mean(|l| l.pairs))
+        .with_candidates(mean(|l| l.axis_candidates), mean(|l| l.strip_candidates))
+        .with_moved(mean(|l| l.moved))
+        .with_moved_share(mean(|l| l.moved_share))
 }
 
 impl Racer {
@@ -375,17 +355,11 @@ mod tests {
 
     #[test]
     fn a_frame_in_which_all_jumps_is_one_of_many() {
-        let mut load = MeanLoad::default();
-        for moved in [0.04, 0.04, 1.0, 0.04] {
-            load.add(
-                &Load::of_objects(10)
-                    .with_pairs(moved * 100.0)
-                    .with_candidates(8.0, 6.0)
-                    .with_moved(moved)
-                    .with_moved_share(moved.floor()),
-            );
-        }
-        let mean = load.mean();
+        let load = |moved: f64| {
+            let load = Load::of_objects(10).with_pairs(moved * 100.0).with_candidates(8.0, 6.0);
+            load.with_moved(moved).with_moved_share(moved.floor())
+        };
+        let mean = mean(&[0.04, 0.04, 1.0, 0.04].map(load));
         assert!((mean.moved - 0.28).abs() < 1e-12 && (mean.pairs - 28.0).abs() < 1e-12, "{mean:?}");
         assert_eq!(mean.moved_share, 0.25);
         assert_eq!((mean.objects, mean.axis_candidates, mean.strip_candidates), (10, 8.0, 6.0));

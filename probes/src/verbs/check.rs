@@ -11,21 +11,14 @@ use sapwise_lab::data::report_files;
 use sapwise_lab::kinds::{Agreement, Kind, Times};
 use sapwise_lab::text::count;
 use serde::Serialize;
+use serde_json::json;
 use std::path::PathBuf;
 
 /// Times over those of repeats above which a report is not like them. Undisturbed repeats differ by 2 %, a program that
 /// takes memory or cache makes it 0 to 36 %.
 const SLOW: f64 = 1.15;
 
-/// The answer for machines.
-#[derive(Serialize)]
-struct Answer {
-    files: Vec<Finding>,
-    /// The kinds of the reports, in the order of the files.
-    kinds: Vec<OfKind>,
-}
-
-/// The reports of one kind.
+/// The reports of one kind, in the order of the files.
 #[derive(Serialize)]
 struct OfKind {
     #[serde(flatten)]
@@ -55,10 +48,8 @@ pub(crate) fn run(arguments: &Check, algorithms: &Algorithms) -> anyhow::Result<
     drop(progress);
     let kinds = compare(&mut files);
     let failed = files.iter().any(|f| !f.problems.is_empty());
-    let answer = Answer { files, kinds };
-    let done = output::answer(arguments.json, &answer, || {
-        let Answer { files, kinds } = &answer;
-        text(files, kinds, Terminal::of_standard_output()) + &next_step(files, &arguments.files)
+    let done = output::answer(arguments.json, &json!({"files": files, "kinds": kinds}), || {
+        text(&files, &kinds, Terminal::of_standard_output()) + &next_step(&files, &arguments.files)
     })?;
     Ok(if failed { Outcome::Failed } else { done })
 }

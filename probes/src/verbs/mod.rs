@@ -34,6 +34,6 @@ pub(crate) fn run(verb: Verb, algorithms: &Algorithms) -> anyhow::Result<Outcome
         Verb::Pairs(arguments) => pairs::run(&arguments, algorithms),
         Verb::Check(arguments) => check::run(&arguments, algorithms),
         Verb::Schema(arguments) => schema::run(&arguments),
-        Verb::Part(arguments) => part::run(arguments, algorithms),
+        Verb::Part(part) => part::run(part, algorithms),
     }
 }

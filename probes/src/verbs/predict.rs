@@ -9,20 +9,20 @@ use crate::hardware::{self, measure_hardware};
 use crate::prediction::{self, Slice};
 use crate::terminal::Terminal;
 use crate::{interrupt, output, outputs, shell, summary};
-use anyhow::{Context, bail};
-use sapwise_lab::data::{Document, read_document};
-use sapwise_lab::report::Report;
+use anyhow::Context;
+use sapwise_lab::data::read_report;
 use sapwise_lab::write::write_text;
 use sapwise_scenes::Scenario;
 use sapwise_tune::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
     hardware::check_threads(arguments.threads)?;
     if let Some(folder) = arguments.report.as_deref().filter(|path| path.is_dir()) {
         return predict_kinds::run(folder, arguments, algorithms);
     }
-    let report = arguments.report.as_deref().map(read_report).transpose()?;
+    let report = arguments.report.as_deref().map(|path| read_report(path, &output::warn)).transpose();
+    let report = report.context("the report can't be used")?.map(|(_, report)| report);
     let inputs: Vec<PathBuf> = arguments.report.iter().chain(&arguments.model).cloned().collect();
     outputs::check(&inputs, &arguments.out.iter().collect::<Vec<_>>())?;
     let model = prediction::model(arguments.model.as_deref())?.model;
@@ -76,11 +76,4 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
     };
     output::print(&text)?;
     Ok(outcome)
-}
-
-fn read_report(path: &Path) -> anyhow::Result<Report> {
-    match read_document(path, &output::warn).context("the report can't be used")? {
-        Document::Report(report) => Ok(*report),
-        _ => bail!("{} is no report; make one with `sapwise probe --out R.json`", path.display()),
-    }
 }

@@ -4,14 +4,7 @@ use crate::args::Schema;
 use crate::exit::Outcome;
 use crate::{output, outputs};
 use sapwise_lab::write::write_text;
-use serde::Serialize;
-
-/// The answer of `--json`.
-#[derive(Serialize)]
-struct Answer {
-    /// The written files.
-    files: Vec<String>,
-}
+use serde_json::json;
 
 pub(crate) fn run(arguments: &Schema) -> anyhow::Result<Outcome> {
     let folder = &arguments.out;
@@ -22,6 +15,5 @@ pub(crate) fn run(arguments: &Schema) -> anyhow::Result<Outcome> {
         write_text(&path, &text)?;
         files.push(path.display().to_string());
     }
-    let answer = Answer { files };
-    output::answer(arguments.json, &answer, || answer.files.iter().map(|f| format!("wrote {f}\n")).collect())
+    output::answer(arguments.json, &json!({"files": files}), || files.iter().map(|f| format!("wrote {f}\n")).collect())
 }

@@ -9,19 +9,10 @@ use crate::{interrupt, output, outputs, shell};
 use sapwise_lab::data::{Selection, read_reports, report_files};
 use sapwise_lab::text::count;
 use sapwise_lab::write::write_text;
-use sapwise_lab::{Trained, Training, Validation, model_card, train, write_model};
+use sapwise_lab::{Trained, Training, model_card, train, write_model};
 use sapwise_tune::Model;
-use serde::Serialize;
+use serde_json::json;
 use std::path::Path;
-
-/// The answer for machines.
-#[derive(Serialize)]
-struct Answer<'a> {
-    validation: &'a Validation,
-    /// Name of the model.
-    model: &'a str,
-    notes: &'a [String],
-}
 
 pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     let name = name(arguments)?;
@@ -41,7 +32,7 @@ pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     if let Some(path) = &arguments.card {
         write_text(path, &model_card::page(&model, &training, &notes))?;
     }
-    let answer = Answer { validation: &training.validation, model: &model.name, notes: &notes };
+    let answer = json!({"validation": training.validation, "model": model.name, "notes": notes});
     let text = || summary(&model, &training, &notes, &arguments.out, Terminal::of_standard_output());
     output::answer(arguments.json, &answer, text)
 }
