@@ -2,9 +2,10 @@
 
 use crate::boxes::Boxes;
 use crate::engine::two_columns;
-use crate::frame::{Flat, Frames, Ids};
-use crate::{Held, Keywords, PyTuning, Start, boxes, call, exception, learning_methods, start, unusable};
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use crate::frame::{Flat, Frames};
+use crate::one_shot::integers;
+use crate::{Held, Keywords, PyTuning, Start, boxes, exception, learning_methods, start, unusable};
+use numpy::PyArray2;
 use pyo3::prelude::*;
 use sapwise::Membership;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -69,7 +70,7 @@ pub(crate) struct PyBroadPhase {
 }
 
 /// A frame that can be searched: its boxes, their ids and the filter.
-type Ready<'py> = (Boxes<'py>, Ids, Option<Arc<Vec<Membership>>>);
+type Ready<'py> = (Boxes<'py>, Option<Vec<i64>>, Option<Arc<Vec<Membership>>>);
 
 impl PyBroadPhase {
     /// Checks what `find` got.
@@ -83,13 +84,7 @@ impl PyBroadPhase {
         let given = self::boxes(boxes, upper, "")?;
         given.warn_if_rounded(py)?;
         let count = given.as_slice()?.len();
-        let ids = match ids {
-            None => Ids::Positions,
-            Some(ids) => {
-                let ids = call(py, "sapwise._arrays", "ids", (ids, count))?;
-                Ids::Given(ids.cast::<PyArray1<i64>>()?.to_vec()?)
-            }
-        };
+        let ids = integers(py, "ids", ids, count)?;
         py.check_signals()?;
         let filter = self.filter().clone();
         if let Some(filter) = filter.as_ref().filter(|f| f.len() != count) {
@@ -191,7 +186,7 @@ impl PyBroadPhase {
         let (given, ids, filter) = ready?;
         let boxes = given.as_slice()?;
         let found = self.frames.write(py, |frames| {
-            if frames.has_other_ids(&ids) {
+            if frames.has_other_ids(ids.is_some()) {
                 frames.fail();
                 return None;
             }

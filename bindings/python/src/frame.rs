@@ -5,25 +5,10 @@ use crate::{Searcher, Start};
 use sapwise::{Aabb, Adaptive, BroadPhase, Changes, Error, Filter, Membership, Pairs};
 use std::sync::{Arc, RwLock};
 
-/// The ids of the boxes of a frame.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Ids {
-    /// The positions of the boxes.
-    Positions,
-    /// The caller's id of each box.
-    Given(Vec<i64>),
-}
-
-/// The pairs of a frame, and the ids of its boxes.
+/// The pairs of a frame, and the caller's ids of its boxes.
 struct Frame {
     pairs: Pairs,
-    ids: Ids,
-}
-
-/// The changes between two frames, by positions or by ids.
-enum Follower {
-    Positions(Changes<u32>),
-    Given(Changes<i64>),
+    ids: Option<Vec<i64>>,
 }
 
 /// Pairs of numbers, flat as in NumPy.
@@ -38,11 +23,13 @@ pub(crate) struct Frames {
     frames: [Frame; 2],
     /// The position in `frames` of the last frame that succeeded.
     now: usize,
-    /// Number of frames that succeeded, and how many of them the follower has seen. It is updated only when the caller
-    /// asks.
+    /// Number of frames that succeeded, and how many of them the changes have seen. They are updated only when the
+    /// caller asks.
     count: u64,
     followed: u64,
-    follower: Follower,
+    /// The changes of frames without ids, and of those with ids: only one of the two is in use.
+    by_position: Changes<u32>,
+    by_id: Changes<i64>,
     /// The last call failed: nothing has begun or ended.
     failed: bool,
     /// The filter of the lists.
@@ -64,22 +51,23 @@ impl Searcher for Frames {
 
 impl Frames {
     pub(crate) fn new(adaptive: Adaptive, start: &Start) -> Self {
-        let frame = || Frame { pairs: start.pairs(), ids: Ids::Positions };
+        let frame = || Frame { pairs: start.pairs(), ids: None };
         Self {
             adaptive,
             frames: [frame(), frame()],
             now: 0,
             count: 0,
             followed: 0,
-            follower: Follower::Positions(Changes::new()),
+            by_position: Changes::new(),
+            by_id: Changes::new(),
             failed: false,
             filter: None,
         }
     }
 
-    /// Returns whether the previous frame had the other kind of ids.
-    pub(crate) fn has_other_ids(&self, ids: &Ids) -> bool {
-        self.count > 0 && std::mem::discriminant(ids) != std::mem::discriminant(&self.frames[self.now].ids)
+    /// Returns whether only one of the previous frame and the next one has ids.
+    pub(crate) fn has_other_ids(&self, ids: bool) -> bool {
+        self.count > 0 && ids != self.frames[self.now].ids.is_some()
     }
 
     /// The next frame was refused: nothing has begun or ended.
@@ -91,7 +79,7 @@ impl Frames {
     pub(crate) fn find(
         &mut self,
         boxes: &[Aabb],
-        ids: Ids,
+        ids: Option<Vec<i64>>,
         filter: Option<&Arc<Vec<Membership>>>,
     ) -> Result<Vec<u32>, Error> {
         let same = match (&self.filter, filter) {
@@ -118,7 +106,7 @@ impl Frames {
         Ok(numbers)
     }
 
-    /// Updates the follower to the last frame.
+    /// Updates the changes to the last frame.
     fn follow(&mut self) -> Result<(), Error> {
         if self.followed == self.count {
             return Ok(());
@@ -126,18 +114,10 @@ impl Frames {
         let [now, before] = [&self.frames[self.now], &self.frames[1 - self.now]];
         // Nobody asked after the previous frame.
         let skipped = self.followed + 1 < self.count;
-        if self.followed == 0 {
-            self.follower = match &now.ids {
-                Ids::Positions => Follower::Positions(Changes::new()),
-                Ids::Given(_) => Follower::Given(Changes::new()),
-            };
-        }
         for frame in skipped.then_some(before).into_iter().chain([now]) {
-            match (&mut self.follower, &frame.ids) {
-                (Follower::Positions(changes), Ids::Positions) => changes.update_positions(&frame.pairs)?,
-                (Follower::Given(changes), Ids::Given(ids)) => changes.update(&frame.pairs, ids)?,
-                // `find` of the class refuses such frames.
-                _ => unreachable!("a frame has the kind of ids of the previous one"),
+            match &frame.ids {
+                None => self.by_position.update_positions(&frame.pairs)?,
+                Some(ids) => self.by_id.update(&frame.pairs, ids)?,
             }
         }
         self.followed = self.count;
@@ -146,21 +126,22 @@ impl Frames {
 
     /// Returns the pairs that began with the last frame, or those that ended.
     pub(crate) fn changed(&mut self, begun: bool) -> Result<Flat, Error> {
-        if self.failed || self.count == 0 {
-            return Ok(match self.frames[self.now].ids {
-                Ids::Positions => Flat::Positions(Vec::new()),
-                Ids::Given(_) => Flat::Given(Vec::new()),
-            });
+        let any = !self.failed && self.count > 0;
+        if any {
+            self.follow()?;
         }
-        self.follow()?;
-        Ok(match &self.follower {
-            Follower::Positions(c) => Flat::Positions(numbers(c, begun)),
-            Follower::Given(c) => Flat::Given(numbers(c, begun)),
+        Ok(match self.frames[self.now].ids {
+            None => Flat::Positions(numbers(&self.by_position, any, begun)),
+            Some(_) => Flat::Given(numbers(&self.by_id, any, begun)),
         })
     }
 }
 
-fn numbers<Id: Copy + Ord>(changes: &Changes<Id>, begun: bool) -> Vec<Id> {
-    let pairs = if begun { changes.begun() } else { changes.ended() };
+fn numbers<Id: Copy + Ord>(changes: &Changes<Id>, any: bool, begun: bool) -> Vec<Id> {
+    let pairs = match (any, begun) {
+        (false, _) => &[],
+        (true, true) => changes.begun(),
+        (true, false) => changes.ended(),
+    };
     pairs.iter().flat_map(|&(a, b)| [a, b]).collect()
 }

@@ -81,15 +81,16 @@ impl Wishes<'_> {
     }
 }
 
-/// Converts the argument `worlds` for `count` boxes, or for a pair of lists.
-fn worlds<'py>(
+/// Converts the argument `ids`, or `worlds`, for `count` boxes, or for a pair of lists.
+pub(crate) fn integers<'py>(
     py: Python<'py>,
-    worlds: Option<&Bound<'py, PyAny>>,
+    name: &str,
+    given: Option<&Bound<'py, PyAny>>,
     count: impl IntoPyObject<'py>,
 ) -> PyResult<Option<Vec<i64>>> {
-    let Some(worlds) = worlds else { return Ok(None) };
-    let keys = call(py, "sapwise._arrays", "worlds", (worlds, count))?;
-    Ok(Some(keys.cast::<PyArray1<i64>>()?.to_vec()?))
+    let Some(given) = given else { return Ok(None) };
+    let array = call(py, "sapwise._arrays", name, (given, count))?;
+    Ok(Some(array.cast::<PyArray1<i64>>()?.to_vec()?))
 }
 
 /// Find all pairs of overlapping boxes.
@@ -179,7 +180,7 @@ pub(crate) fn pairs<'py>(
     let given = crate::boxes(boxes, upper, "")?;
     let count = given.as_slice()?.len();
     let filter = Keywords { groups, masks, owner, fixed }.memberships(py, count)?;
-    let worlds = self::worlds(py, worlds, count)?;
+    let worlds = integers(py, "worlds", worlds, count)?;
     let wishes = Wishes { filter, margin, algorithm, worlds, ordered, limit };
     wishes.check(py)?;
     let mut grown = wishes.grown(py, &given, "")?;
@@ -261,7 +262,7 @@ pub(crate) fn pairs_between<'py>(
         return Err(exception(py, &Error::TooManyObjects { objects }, ""));
     };
     let filter = Keywords { groups, masks, owner, fixed }.memberships(py, (first, second))?;
-    let worlds = self::worlds(py, worlds, (first, second))?;
+    let worlds = integers(py, "worlds", worlds, (first, second))?;
     let mut wishes = Wishes { filter, margin, algorithm, worlds, ordered, limit };
     wishes.check(py)?;
     let (grown_a, grown_b) = (wishes.grown(py, &of_a, " of a")?, wishes.grown(py, &of_b, " of b")?);
