@@ -2,7 +2,7 @@
 
 use crate::call;
 use crate::error::stale;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{IntoPyArray, PyArray1, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use sapwise::{Error, Handle, Space};
 
@@ -39,11 +39,6 @@ pub(crate) fn check(space: &Space, handles: &[Handle]) -> Result<(), Error> {
 /// Makes an array of handles.
 pub(crate) fn array(py: Python<'_>, handles: impl IntoIterator<Item = Handle>) -> Bound<'_, PyArray1<u64>> {
     handles.into_iter().map(Handle::to_bits).collect::<Vec<u64>>().into_pyarray(py)
-}
-
-/// Makes an array with the two handles of a pair a row.
-pub(crate) fn pairs<'py>(py: Python<'py>, numbers: Vec<u64>) -> PyResult<Bound<'py, PyArray2<u64>>> {
-    crate::engine::two_columns(py, numbers)
 }
 
 /// Returns the bits of the handles of these pairs, two each.

@@ -126,16 +126,12 @@ impl<T: Searcher> Held<T> {
         Ok(saved)
     }
 
-    pub(crate) fn close(&self, py: Python<'_>) {
-        let (searcher, foreign) = {
-            let mut state = self.state();
-            (state.searcher.take(), state.pid != std::process::id())
-        };
-        if foreign {
-            std::mem::forget(searcher);
-        } else {
-            py.detach(|| drop(searcher));
-        }
+    pub(crate) fn close(&self) {
+        let mut state = self.state();
+        let closed = State { pid: state.pid, searcher: state.searcher.take() };
+        drop(state);
+        // Waits without the lock.
+        drop(closed);
     }
 
     pub(crate) fn is_closed(&self) -> bool {
@@ -147,7 +143,7 @@ impl<T: Searcher> Held<T> {
     pub(crate) fn exit(&self, py: Python<'_>) -> PyResult<bool> {
         if !self.is_closed() {
             let saved = if self.start.keeps { self.save(py).err() } else { None };
-            self.close(py);
+            self.close();
             if let Some(why) = saved {
                 call(py, "sapwise._errors", "warn_unsaved", (why.value(py).to_string(),))?;
             }
@@ -208,8 +204,8 @@ macro_rules! learning_methods {
             }
 
             /// End its threads and free its memory. It can't be used afterwards. Closing it twice does nothing.
-            fn close(&self, py: Python<'_>) {
-                self.$held.close(py);
+            fn close(&self) {
+                self.$held.close();
             }
 
             /// bool: whether it was closed.

@@ -1,6 +1,7 @@
 //! The class `Space`.
 
-use crate::handles::{bits, check, first_stale, handles, pairs};
+use crate::engine::two_columns;
+use crate::handles::{bits, check, first_stale, handles};
 use crate::view::PyView;
 use crate::{
     Held, Keywords, PyTuning, Searcher, Start, array, exception, invalid_box, kept, learning_methods, start, unusable,
@@ -112,7 +113,7 @@ impl PySpace {
         py: Python<'py>,
         list: fn(&Space) -> &[(Handle, Handle)],
     ) -> PyResult<Bound<'py, PyArray2<u64>>> {
-        pairs(py, self.held.read(py, |space| bits(list(space)))?)
+        two_columns(py, self.held.read(py, |space| bits(list(space)))?)
     }
 }
 
