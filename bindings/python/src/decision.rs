@@ -1,9 +1,10 @@
 //! The class `Decision`.
 
+use crate::error::parsed;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 use sapwise::Decision;
 use sapwise::algorithm::Load;
+use sapwise_tune::json;
 
 /// What was decided for a frame, and why. ``str()`` of it is a sentence.
 ///
@@ -80,8 +81,8 @@ impl PyDecision {
 #[pymethods]
 impl PyDecision {
     #[getter]
-    fn load<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        as_dict(py, &self.load)
+    fn load<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        parsed(py, json::write(&self.load))
     }
 
     fn __str__(&self) -> &str {
@@ -91,16 +92,4 @@ impl PyDecision {
     fn __repr__(&self) -> String {
         format!("<sapwise.Decision: {}>", self.sentence)
     }
-}
-
-/// Converts a load to a dict.
-pub(crate) fn as_dict<'py>(py: Python<'py>, load: &Load) -> PyResult<Bound<'py, PyDict>> {
-    let dict = PyDict::new(py);
-    dict.set_item("objects", load.objects)?;
-    dict.set_item("axis_candidates", load.axis_candidates)?;
-    dict.set_item("strip_candidates", load.strip_candidates)?;
-    dict.set_item("pairs", load.pairs)?;
-    dict.set_item("moved", load.moved)?;
-    dict.set_item("moved_share", load.moved_share)?;
-    Ok(dict)
 }

@@ -3,6 +3,7 @@
 use pyo3::prelude::*;
 use sapwise::Error;
 use sapwise::error::{BoxDefect, RayDefect, Unavailable};
+use sapwise_tune::json;
 
 /// Makes an instance of a class of `sapwise._errors`.
 fn instance<'py>(py: Python<'py>, class: &str, arguments: impl pyo3::call::PyCallArgs<'py>) -> PyErr {
@@ -73,7 +74,12 @@ pub(crate) fn with_cause(error: &dyn std::error::Error) -> String {
     error.source().map_or_else(|| error.to_string(), |source| format!("{error}: {source}"))
 }
 
-/// Calls a function of a module of the package.
+/// Converts JSON to what Python has for it.
+pub(crate) fn parsed<'py>(py: Python<'py>, text: Result<String, json::Error>) -> PyResult<Bound<'py, PyAny>> {
+    call(py, "json", "loads", (text.map_err(|why| failed(py, with_cause(&why)))?,))
+}
+
+/// Calls a function of a module.
 pub(crate) fn call<'py>(
     py: Python<'py>,
     module: &str,

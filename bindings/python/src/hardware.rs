@@ -1,10 +1,11 @@
 //! Measures the hardware in this process, one family of parameters after another.
 
+use crate::error::parsed;
 use crate::failed;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use sapwise_tune::ParameterId;
 use sapwise_tune::measure::{Family, Options, family, machine};
+use sapwise_tune::{ParameterId, json};
 use std::str::FromStr;
 use std::time::Duration;
 
@@ -19,7 +20,7 @@ pub(crate) fn measure_hardware<'py>(
     py: Python<'py>,
     quick: bool,
     progress: Option<&Bound<'py, PyAny>>,
-) -> PyResult<(Bound<'py, PyDict>, Bound<'py, PyList>)> {
+) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyList>)> {
     let of = Family::ALL.len();
     let share = QUICK / u32::try_from(of).map_err(|why| failed(py, why.to_string()))?;
     let options = if quick { Options::default().with_limit(share) } else { Options::default() };
@@ -47,18 +48,5 @@ pub(crate) fn measure_hardware<'py>(
     if let Some(progress) = progress {
         progress.call1((of, of, "done"))?;
     }
-    let found = machine();
-    let dict = PyDict::new(py);
-    for (key, value) in [
-        ("physical_id", found.physical_id),
-        ("cpu", found.cpu),
-        ("vendor", found.vendor),
-        ("arch", found.arch),
-        ("os", found.os),
-        ("simd", found.simd),
-        ("hypervisor", found.hypervisor),
-    ] {
-        dict.set_item(key, value)?;
-    }
-    Ok((dict, list))
+    Ok((parsed(py, json::write(&machine()))?, list))
 }

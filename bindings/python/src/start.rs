@@ -6,7 +6,6 @@ use pyo3::prelude::*;
 use sapwise::{Adaptive, Error, PairOrder, Pairs, Registry, Tuning};
 use sapwise_tune::StartOptions;
 use std::path::PathBuf;
-use std::time::Duration;
 
 /// What a caller asked for.
 #[derive(Debug, Clone)]
@@ -195,12 +194,6 @@ pub(crate) fn options(cache: Option<&Bound<'_, PyAny>>) -> PyResult<StartOptions
         (_, Ok(folder)) => Ok(options.cache(Some(folder))),
         _ => Err(unusable(given.py(), "cache is a folder, False for none, or None for the user's cache folder")),
     }
-}
-
-/// Converts an argument in seconds.
-pub(crate) fn seconds(py: Python<'_>, name: &str, seconds: f64) -> PyResult<Duration> {
-    Duration::try_from_secs_f64(seconds)
-        .map_err(|_| unusable(py, format!("{name} is {seconds}; give seconds, 0 or more and finite")))
 }
 
 /// Makes an adaptive broad phase without the interpreter's lock. Checks for Ctrl-C before and after.

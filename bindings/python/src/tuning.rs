@@ -1,16 +1,17 @@
 //! `predict` and the class `Tuning`.
 
-use crate::{boxes, failed, start, unusable, with_cause};
+use crate::error::parsed;
+use crate::{boxes, exception, failed, start, unusable, with_cause};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
-use sapwise::Tuning;
+use pyo3::types::{IntoPyDict, PyDict};
 use sapwise::algorithm::{Load, Motion};
+use sapwise::{Aabb, Error, Tuning};
 use sapwise_tune::{Setup, json};
-use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::thread;
 use std::time::Duration;
 
 /// Interval of the checks for Ctrl-C.
-const LOOK: Duration = Duration::from_millis(20);
+const LOOK: Duration = Duration::from_millis(5);
 
 /// The expected cost of each algorithm on a machine.
 ///
@@ -88,18 +89,8 @@ impl PyTuning {
     }
 
     #[getter]
-    fn crossovers<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
-        let list = PyList::empty(py);
-        for crossover in &self.tuning.crossovers {
-            let dict = PyDict::new(py);
-            dict.set_item("below", crossover.below.to_string())?;
-            dict.set_item("above", crossover.above.to_string())?;
-            dict.set_item("objects", crossover.objects)?;
-            dict.set_item("low", crossover.low)?;
-            dict.set_item("high", crossover.high)?;
-            list.append(dict)?;
-        }
-        Ok(list)
+    fn crossovers<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        parsed(py, json::write(&self.tuning.crossovers))
     }
 
     #[getter]
@@ -175,9 +166,7 @@ impl PyTuning {
         let py = boxes.py();
         let given = self::boxes(boxes, upper, "")?;
         let boxes = given.as_slice()?;
-        if let Some((index, defect)) = boxes.iter().enumerate().find_map(|(k, b)| b.defect().map(|d| (k, d))) {
-            return Err(crate::error::invalid_box(py, "", index, defect));
-        }
+        Aabb::check(boxes, 0).map_err(|error| exception(py, &error, ""))?;
         let moved_share = share(moved, moved_share);
         self.of(py, py.detach(|| Load::estimate(boxes, None, Some(Motion { moved, moved_share }))))
     }
@@ -213,11 +202,7 @@ impl PyTuning {
         let cost = |c: &sapwise::tuning::AlgorithmCost| (c.algorithm.to_string(), c.curve.cost_ns(&load));
         let mut costs: Vec<(String, f64)> = self.tuning.costs.iter().map(cost).collect();
         costs.sort_by(|a, b| a.1.total_cmp(&b.1));
-        let dict = PyDict::new(py);
-        for (algorithm, ns) in costs {
-            dict.set_item(algorithm, ns)?;
-        }
-        Ok(dict)
+        costs.into_py_dict(py)
     }
 }
 
@@ -256,31 +241,21 @@ pub(crate) fn setup<'py>(py: Python<'py>, setup: &Setup) -> PyResult<Bound<'py, 
 #[pyfunction]
 #[pyo3(signature = (*, cache=None, seconds=2.0))]
 pub(crate) fn predict(py: Python<'_>, cache: Option<&Bound<'_, PyAny>>, seconds: f64) -> PyResult<PyTuning> {
-    let options = start::options(cache)?.background(false).measure(Some(start::seconds(py, "seconds", seconds)?));
-    let (done, found) = channel();
+    let limit = Duration::try_from_secs_f64(seconds)
+        .map_err(|_| unusable(py, format!("seconds is {seconds}; give seconds, 0 or more and finite")))?;
+    let options = start::options(cache)?.background(false).measure(Some(limit));
     // On a thread, so that Ctrl-C is seen meanwhile. The thread ends by itself, within the seconds.
-    let thread = std::thread::Builder::new().name("sapwise-predict".to_owned());
+    let thread = thread::Builder::new().name("sapwise-predict".to_owned());
     let work = move || {
-        let made = sapwise_tune::for_this_machine(&options);
-        let _ = done.send(made.map(|adaptive| (adaptive.tuning().clone(), adaptive.setup().clone())));
+        let made = sapwise_tune::for_this_machine(&options)?;
+        Ok::<_, Error>((made.tuning().clone(), made.setup().clone()))
     };
     let thread = thread.spawn(work).map_err(|why| failed(py, format!("no thread can be started: {why}")))?;
-    // The closure must be `Sync`, which a receiver is not.
-    let found = std::sync::Mutex::new(found);
-    let made = loop {
-        let waited = py.detach(|| match found.lock() {
-            Ok(found) => found.recv_timeout(LOOK),
-            Err(_) => Err(RecvTimeoutError::Disconnected),
-        });
-        match waited {
-            Ok(made) => break made,
-            Err(RecvTimeoutError::Timeout) => py.check_signals()?,
-            Err(RecvTimeoutError::Disconnected) => {
-                return Err(failed(py, "the measurement ended without a result; please report it"));
-            }
-        }
-    };
-    let _ = py.detach(|| thread.join());
+    while !thread.is_finished() {
+        py.check_signals()?;
+        py.detach(|| thread::sleep(LOOK));
+    }
+    let made = thread.join().map_err(|_| failed(py, "the measurement ended without a result; please report it"))?;
     let (tuning, setup) = made.map_err(|error| failed(py, error.to_string()))?;
     crate::engine::start_again(py);
     Ok(PyTuning { tuning, setup: Some(setup) })
