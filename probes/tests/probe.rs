@@ -90,7 +90,7 @@ fn an_interrupt_keeps_what_was_measured_and_leaves_a_report_that_is_there() {
         let mut probe = program();
         probe.args(["probe", "--max-objects", "30"]).arg("--out").arg(&out);
         for scenario in sapwise_scenes::Scenario::ALL {
-            probe.args(["--scenario", scenario.name()]);
+            probe.args(["--scenario", scenario.as_str()]);
         }
         let holds = format!("error: interrupted: {} holds", kept.display());
         interrupt_when(&mut probe, || out.with_added_extension("unfinished").exists(), &holds);

@@ -27,5 +27,5 @@ fn write(path: &Path, course: Course) -> Result<(), Box<dyn Error>> {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = PathBuf::from(std::env::args().nth(1).ok_or("usage: streams DIR")?);
-    Course::ALL.into_iter().try_for_each(|course| write(&folder.join(format!("{}.npy", course.name())), course))
+    Course::ALL.into_iter().try_for_each(|course| write(&folder.join(format!("{}.npy", course.as_str())), course))
 }

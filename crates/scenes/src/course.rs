@@ -30,14 +30,7 @@ named! {
 }
 
 impl Course {
-    /// Its name, and that of its file.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        self.as_str()
-    }
-
     /// The scenario of its boxes.
-    #[must_use]
     pub fn scenario(self) -> Scenario {
         match self {
             Self::Level => Scenario::Mixed,
@@ -47,7 +40,6 @@ impl Course {
     }
 
     /// How many of `objects` boxes are there in a frame.
-    #[must_use]
     pub fn boxes(self, frame: usize, objects: usize) -> usize {
         match self {
             Self::Level if frame < 150 => 40,
@@ -57,7 +49,6 @@ impl Course {
     }
 
     /// Steps that the scene makes after a frame.
-    #[must_use]
     pub fn steps(self, frame: usize) -> usize {
         if self == Self::Fight && (200..400).contains(&frame) { 12 } else { 1 }
     }

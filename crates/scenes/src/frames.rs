@@ -40,25 +40,21 @@ pub struct Frames {
 
 impl Frames {
     /// Returns the number of frames.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.ends.len()
     }
 
     /// Whether there is no frame. A frame without boxes counts as one.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.ends.is_empty()
     }
 
     /// Returns the largest number of boxes in a frame.
-    #[must_use]
     pub fn objects(&self) -> usize {
         self.iter().map(<[Aabb]>::len).max().unwrap_or(0)
     }
 
     /// Returns the boxes of a frame; none beyond the last frame.
-    #[must_use]
     pub fn frame(&self, frame: usize) -> &[Aabb] {
         let Some(&end) = self.ends.get(frame) else { return &[] };
         let start = frame.checked_sub(1).map_or(0, |before| self.ends[before]);

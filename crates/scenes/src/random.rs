@@ -21,13 +21,11 @@ pub struct Random(u64);
 
 impl Random {
     /// Returns the generator of a seed.
-    #[must_use]
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
 
     /// Returns the generator of a seed and some words.
-    #[must_use]
     pub fn named(seed: u64, words: &[&str]) -> Self {
         let mut state = Self::new(seed);
         // 256 ends a word, so that "ab", "c" differs from "a", "bc".

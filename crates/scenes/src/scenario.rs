@@ -153,18 +153,11 @@ impl Scenario {
     /// Frames in one cycle of [`Scenario::Fragmentation`], after which the numbers of objects repeat.
     pub const FRAGMENTATION_FRAMES: u64 = 600;
 
-    /// Returns the name that `FromStr` reads.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        self.as_str()
-    }
-
     /// Starts the scene at frame 0 with `objects` objects. For [`Scenario::Fragmentation`] that is the peak, and ten
     /// stand at first.
     ///
     /// The same scenario, number of objects and seed give the same bits in every frame on every platform. The scene
     /// allocates all its memory here: up to 52 bytes per object.
-    #[must_use]
     pub fn start(self, objects: usize, seed: u64) -> Scene {
         Scene::start(self, objects, seed)
     }

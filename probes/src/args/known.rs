@@ -19,7 +19,7 @@ impl<P: TypedValueParser> TypedValueParser for Scenarios<P> {
     }
 
     fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
-        Some(Box::new(Scenario::ALL.into_iter().map(|s| PossibleValue::new(s.name()))))
+        Some(Box::new(Scenario::ALL.into_iter().map(|s| PossibleValue::new(s.as_str()))))
     }
 }
 

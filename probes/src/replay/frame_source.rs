@@ -44,7 +44,7 @@ impl FrameSource {
     /// The name of the scenario or of the file.
     pub(crate) fn name(&self) -> &str {
         match self {
-            Self::Scene { scenario, .. } => scenario.name(),
+            Self::Scene { scenario, .. } => scenario.as_str(),
             Self::Stream { name, .. } => name,
         }
     }

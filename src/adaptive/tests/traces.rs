@@ -47,11 +47,11 @@ fn keeps(id: &AlgorithmId) -> bool {
 impl Trace {
     fn read(path: &Path) -> Self {
         let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
-        let course = Course::ALL.into_iter().find(|course| name.starts_with(course.name()));
+        let course = Course::ALL.into_iter().find(|course| name.starts_with(course.as_str()));
         let scenario = course.map(Course::scenario).unwrap_or_else(|| {
             // The name of a scenario may have a dash.
-            let all = Scenario::ALL.into_iter().filter(|scenario| name.starts_with(scenario.name()));
-            all.max_by_key(|scenario| scenario.name().len()).unwrap()
+            let all = Scenario::ALL.into_iter().filter(|scenario| name.starts_with(scenario.as_str()));
+            all.max_by_key(|scenario| scenario.as_str().len()).unwrap()
         });
         let numbers: Vec<u64> = name.split('-').flat_map(str::parse).collect();
         let text = std::fs::read_to_string(path).unwrap();

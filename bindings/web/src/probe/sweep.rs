@@ -230,7 +230,7 @@ impl Sweep {
         let (pairs, fingerprint) = self.answer.unwrap_or_default();
         let load = self.load.with_pairs(pairs as f64);
         let point = json!({
-            "scenario": scenario.name(), "load": load, "pairs": pairs, "fingerprint": format!("{fingerprint:016x}"),
+            "scenario": scenario.as_str(), "load": load, "pairs": pairs, "fingerprint": format!("{fingerprint:016x}"),
             "foreign_load": null, "spoiled": 0, "timings": timings,
         });
         self.points.push((load, point));

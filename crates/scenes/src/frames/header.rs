@@ -23,16 +23,16 @@ pub(super) struct Header {
 }
 
 impl Header {
-    /// Reads the header at the start of a file and nothing after it.
-    pub(super) fn read(file: &mut impl Read) -> Result<Self, NpyError> {
+    /// Reads the header at the start of a file and nothing after it. Returns the number of its bytes too.
+    pub(super) fn read(file: &mut impl Read) -> Result<(Self, u64), NpyError> {
         let mut magic = Vec::new();
         file.take(6).read_to_end(&mut magic)?;
         if magic != MAGIC {
             return Err(if magic.is_empty() { NpyError::Empty } else { NpyError::NotNpy });
         }
-        let length = match bytes(file)? {
-            [1, _] => u64::from(u16::from_le_bytes(bytes(file)?)),
-            [2 | 3, _] => u64::from(u32::from_le_bytes(bytes(file)?)),
+        let (before, length) = match bytes(file)? {
+            [1, _] => (10, u64::from(u16::from_le_bytes(bytes(file)?))),
+            [2 | 3, _] => (12, u64::from(u32::from_le_bytes(bytes(file)?))),
             [other, _] => return Err(NpyError::Version(other)),
         };
         let mut header = Vec::new();
@@ -41,7 +41,7 @@ impl Header {
             return Err(NpyError::CutHeader);
         }
         let text = str::from_utf8(&header).map_err(|e| NpyError::Header(format!("it is no text: {e}")))?;
-        Self::parse(text).map_err(NpyError::Header)
+        Ok((Self::parse(text).map_err(NpyError::Header)?, before + length))
     }
 
     /// Writes the header of a file whose data begin at a multiple of 64 bytes, as numpy does. The shape has two axes

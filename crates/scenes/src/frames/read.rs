@@ -1,7 +1,7 @@
 //! Reading a stream of frames.
 
 use std::fs::{self, File};
-use std::io::{self, BufReader, Read};
+use std::io::{BufReader, ErrorKind, Read};
 use std::path::Path;
 
 use super::error::{FramesError, NpyError};
@@ -40,9 +40,8 @@ impl Frames {
         if length == 0 {
             return Err(NpyError::Empty);
         }
-        let mut counted = Counted { file: &mut file, bytes: 0 };
-        let Header { descr, fortran_order, shape } = Header::read(&mut counted)?;
-        let held = length.saturating_sub(counted.bytes);
+        let (Header { descr, fortran_order, shape }, taken) = Header::read(&mut file)?;
+        let held = length.saturating_sub(taken);
         if descr != "<f4" {
             return Err(NpyError::Elements(descr));
         }
@@ -61,8 +60,7 @@ impl Frames {
             return Err(NpyError::EmptyFrames(frames as u64));
         }
         let count = frames.checked_mul(objects);
-        let Some((count, bytes)) = count.and_then(|boxes| Some((boxes, (boxes as u64).checked_mul(4 * BOUNDS)?)))
-        else {
+        let Some(bytes) = count.and_then(|boxes| (boxes as u64).checked_mul(4 * BOUNDS)) else {
             return Err(NpyError::TooLarge { shape, limit: "any file holds" });
         };
         if held < bytes {
@@ -71,8 +69,7 @@ impl Frames {
         if held > bytes {
             return Err(NpyError::Trailing { extra: held - bytes, bytes });
         }
-        let boxes =
-            if fortran_order { in_fortran_order(&mut file, frames, objects)? } else { in_c_order(&mut file, count)? };
+        let boxes = boxes(&mut file, fortran_order, frames, objects)?;
         // Only a stream of several frames needs absent boxes: in one frame a row of NaN is a mistake.
         if single {
             return Ok(Frames { ends: vec![boxes.len()], boxes });
@@ -81,59 +78,27 @@ impl Frames {
     }
 }
 
-/// A reader that counts its bytes.
-struct Counted<'a, R> {
-    file: &'a mut R,
-    bytes: u64,
-}
-
-impl<R: Read> Read for Counted<'_, R> {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let read = self.file.read(buffer)?;
-        self.bytes += read as u64;
-        Ok(read)
-    }
-}
-
-fn room(boxes: usize) -> Result<Vec<Aabb>, NpyError> {
-    let mut room = Vec::new();
-    room.try_reserve_exact(boxes)?;
-    Ok(room)
-}
-
-fn in_c_order(file: &mut impl Read, count: usize) -> Result<Vec<Aabb>, NpyError> {
-    let mut boxes = room(count)?;
-    for _ in 0..count {
-        let mut bounds = [0.0; BOUNDS as usize];
-        for bound in &mut bounds {
-            *bound = element(file)?;
-        }
-        let [min_x, min_y, min_z, max_x, max_y, max_z] = bounds;
-        boxes.push(Aabb::new([min_x, min_y, min_z], [max_x, max_y, max_z]));
-    }
-    Ok(boxes)
-}
-
-fn in_fortran_order(file: &mut impl Read, frames: usize, objects: usize) -> Result<Vec<Aabb>, NpyError> {
-    let mut boxes = room(frames * objects)?;
+/// Reads the boxes of all frames, whose bounds stand in this order.
+fn boxes(file: &mut impl Read, fortran_order: bool, frames: usize, objects: usize) -> Result<Vec<Aabb>, NpyError> {
+    let mut boxes: Vec<Aabb> = Vec::new();
+    boxes.try_reserve_exact(frames * objects)?;
     boxes.resize(frames * objects, Aabb::default());
-    for bound in 0..BOUNDS as usize {
+    let bounds = BOUNDS as usize;
+    let [outer, inner] = if fortran_order { [bounds, frames] } else { [frames, bounds] };
+    for first in 0..outer {
         for object in 0..objects {
-            for frame in 0..frames {
+            for last in 0..inner {
+                let [frame, bound] = if fortran_order { [last, first] } else { [first, last] };
                 let b = &mut boxes[frame * objects + object];
                 let corner = if bound < 3 { &mut b.min } else { &mut b.max };
-                corner[bound % 3] = element(file)?;
+                let mut bytes = [0; 4];
+                file.read_exact(&mut bytes)
+                    .map_err(|e| if e.kind() == ErrorKind::UnexpectedEof { NpyError::Changed } else { e.into() })?;
+                corner[bound % 3] = f32::from_le_bytes(bytes);
             }
         }
     }
     Ok(boxes)
-}
-
-fn element(file: &mut impl Read) -> Result<f32, NpyError> {
-    let mut bytes = [0; 4];
-    file.read_exact(&mut bytes)
-        .map_err(|e| if e.kind() == io::ErrorKind::UnexpectedEof { NpyError::Changed } else { e.into() })?;
-    Ok(f32::from_le_bytes(bytes))
 }
 
 /// Returns frames of `objects` rows each without the absent boxes.

@@ -41,6 +41,13 @@ impl Rng {
         signed3(self.bits())
     }
 
+    /// A place between walls, which stand at this distance on both sides of the origin on each axis.
+    #[inline]
+    pub(super) fn within(&mut self, walls: [f32; 3]) -> [f32; 3] {
+        let u = self.signed3();
+        [0, 1, 2].map(|a| u[a] * walls[a])
+    }
+
     /// One number, uniform over 0 (included) to 1 (excluded) in steps of 2^-24.
     #[inline]
     pub(super) fn unit(&mut self) -> f32 {

@@ -106,7 +106,7 @@ impl Roam {
             let (kind, home) = place(k, rng);
             roam.kind_of.push(kind as u8);
             roam.homes.push(home);
-            roam.offsets.push(roam.kinds[kind].anywhere(rng));
+            roam.offsets.push(rng.within(roam.kinds[kind].walls));
         }
         roam
     }
@@ -227,7 +227,7 @@ impl Roam {
             if !scattered.is(k, rng) {
                 return (0, [0.0; 3]);
             }
-            let [x, y, z] = cubes.anywhere(rng);
+            let [x, y, z] = rng.within(cubes.walls);
             (1, [x, y - 4.0e6, z])
         })
     }
@@ -342,7 +342,7 @@ impl Roam {
                 continue;
             }
             if jump {
-                *offset = kind.anywhere(rng);
+                *offset = rng.within(kind.walls);
             } else {
                 let step = rng.signed3();
                 for a in 0..3 {
@@ -360,12 +360,6 @@ impl Roam {
 }
 
 impl Kind {
-    /// Returns a random place between the walls, relative to the home.
-    fn anywhere(&self, rng: &mut Rng) -> [f32; 3] {
-        let u = rng.signed3();
-        [0, 1, 2].map(|a| u[a] * self.walls[a])
-    }
-
     #[inline]
     fn aabb(&self, home: &[f32; 3], offset: &[f32; 3]) -> Aabb {
         let centre = [0, 1, 2].map(|a| home[a] + offset[a]);

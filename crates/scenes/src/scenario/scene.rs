@@ -89,7 +89,6 @@ impl Scene {
     }
 
     /// Returns the boxes of this frame in the order of the objects. All are valid and finite.
-    #[must_use]
     pub fn boxes(&self) -> &[Aabb] {
         &self.boxes
     }
@@ -113,26 +112,22 @@ impl Scene {
     }
 
     /// Returns the number of the frame, 0 at the start.
-    #[must_use]
     pub fn frame(&self) -> u64 {
         self.frame
     }
 
     /// Returns the kind of scene.
-    #[must_use]
     pub fn scenario(&self) -> Scenario {
         self.scenario
     }
 
     /// Returns the largest number of boxes in any frame.
-    #[must_use]
     pub fn peak_objects(&self) -> usize {
         self.objects
     }
 
     /// Whether the object with this index never moves, like the ground of [`Scenario::StaticWorld`]. `false` beyond
     /// the end of the list.
-    #[must_use]
     pub fn is_fixed(&self, index: usize) -> bool {
         match &self.motion {
             Motion::Walk(m) => m.is_fixed(index),

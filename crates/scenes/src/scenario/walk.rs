@@ -73,17 +73,11 @@ impl Walk {
             replaced: 0,
         };
         for _ in 0..objects {
-            let centre = walk.anywhere(rng);
+            let centre = rng.within(walls);
             walk.centres.push(centre);
             walk.halves.push(half(rng));
         }
         walk
-    }
-
-    /// Returns a random place between the walls.
-    fn anywhere(&self, rng: &mut Rng) -> [f32; 3] {
-        let u = rng.signed3();
-        [0, 1, 2].map(|a| u[a] * self.walls[a])
     }
 
     /// Writes the boxes of all objects.
@@ -104,7 +98,7 @@ impl Walk {
             self.centres.swap_remove(leaves);
         }
         for _ in 0..self.replaced {
-            let centre = self.anywhere(rng);
+            let centre = rng.within(self.walls);
             self.centres.push(centre);
         }
         let phase = (frame / AWAKE_FRAMES % self.sparsity as u64) as usize;
