@@ -1,15 +1,15 @@
-//! What a terminal shows. What a pipe gets, without colours, is in every other test.
-
-#![cfg(target_os = "linux")]
+//! What a terminal shows, and what a pipe gets.
 
 mod common;
 
-use common::small_report;
+use common::{sapwise, small_report, success};
 use std::fs;
+#[cfg(target_os = "linux")]
 use std::process::Command;
 
 /// Returns what the prediction for a report shows on a terminal of a width. `None`, with a line that says so, without
 /// the program `script`, which makes a terminal.
+#[cfg(target_os = "linux")]
 fn on_a_terminal(columns: u32, variables: &[(&str, &str)]) -> Option<String> {
     let quoted = |text: &str| format!("'{text}'");
     let program = quoted(&assert_cmd::cargo::cargo_bin!("sapwise").display().to_string());
@@ -37,6 +37,7 @@ fn on_a_terminal(columns: u32, variables: &[(&str, &str)]) -> Option<String> {
     }
 }
 
+#[cfg(target_os = "linux")]
 #[test]
 fn a_terminal_has_bold_heads_and_may_refuse_colours() {
     let Some(text) = on_a_terminal(100, &[]) else { return };
@@ -47,4 +48,16 @@ fn a_terminal_has_bold_heads_and_may_refuse_colours() {
     }
     let coloured = on_a_terminal(100, &[("NO_COLOR", "")]).unwrap();
     assert!(coloured.contains('\u{1b}'), "{coloured}");
+}
+
+#[test]
+fn a_pipe_gets_no_colours() {
+    let mut command = sapwise();
+    command.env("TERM", "xterm-256color").env("CLICOLOR_FORCE", "1").env("LANG", "C.UTF-8");
+    let folder = tempfile::tempdir().unwrap();
+    let report = folder.path().join("report.json");
+    fs::write(&report, small_report("a").to_string()).unwrap();
+    let text = success(command.args(["predict", "--no-gpus", "--report"]).arg(report));
+    assert!(!text.contains('\u{1b}'), "{text}");
+    assert!(text.contains("\nNext: "), "{text}");
 }

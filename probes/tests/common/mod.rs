@@ -11,11 +11,10 @@ pub(crate) fn sapwise() -> Command {
     Command::from_std(program())
 }
 
-/// The same, to be spawned. A pipe gets no colours, whatever these variables ask for.
+/// The same, to be spawned.
 pub(crate) fn program() -> std::process::Command {
     let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
     command.env_remove("SAPWISE_SIMD").env_remove("CARGO");
-    command.env("TERM", "xterm-256color").env("CLICOLOR_FORCE", "1").env("LANG", "C.UTF-8");
     command
 }
 
