@@ -26,9 +26,6 @@ struct Options {
     /// Write the boxes of all frames to this .npy file, for `sapwise run` and `sapwise pairs`.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
-    /// Print the last line only.
-    #[arg(long)]
-    quiet: bool,
 }
 
 /// Frames from one line of the output to the next.
@@ -41,9 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut recorded: Vec<Vec<Aabb>> = Vec::new();
     let mut ran: BTreeMap<String, usize> = BTreeMap::new();
     let (mut least, mut most, mut pairs) = (usize::MAX, 0, 0);
-    if !options.quiet {
-        println!(" frame  bodies   boxes   pairs   begun   ended  rapier's  algorithm");
-    }
+    println!(" frame  bodies   boxes   pairs   begun   ended  rapier's  algorithm");
     for frame in 0..options.frames {
         world.prepare_step();
         comparison.before_step(world.physics())?;
@@ -52,7 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         (least, most) = (least.min(counts.boxes), most.max(counts.boxes));
         pairs += counts.rapier;
         let algorithm = comparison.last_decision().map_or(String::new(), |d| d.algorithm.to_string());
-        if !options.quiet && frame % LINE_EVERY == 0 {
+        if frame % LINE_EVERY == 0 {
             let bodies = world.bodies();
             let Counts { boxes, found, begun, ended, rapier, .. } = counts;
             println!("{frame:>6} {bodies:>7} {boxes:>7} {found:>7} {begun:>7} {ended:>7} {rapier:>9}  {algorithm}");

@@ -1,8 +1,7 @@
 //! Sapwise against rapier's own broad phase, and what keeps the comparison honest.
 
-use rapier3d::prelude::*;
 use sapwise::{Aabb, Registry};
-use sapwise_example_rapier3d::{Comparison, Counts, Mismatch, Settings, World};
+use sapwise_example_rapier3d::{Comparison, Counts, Settings, World};
 use sapwise_scenes::Frames;
 use std::process::Command;
 
@@ -65,30 +64,6 @@ fn pairs_of_bodies_that_sleep_are_the_same_too() {
 }
 
 #[test]
-fn a_body_that_moves_behind_the_back_of_the_comparison_is_a_mismatch() {
-    let mut world = PhysicsWorld::new();
-    let cube = || ColliderBuilder::cuboid(0.5, 0.5, 0.5);
-    let at = |x| RigidBodyBuilder::dynamic().translation(Vector::new(x, 0.0, 0.0));
-    let (_, near_cube) = world.insert(at(0.0), cube());
-    let (far, far_cube) = world.insert(at(5.0), cube());
-    let mut comparison = Comparison::new(&Registry::with_cores(1)).unwrap();
-    comparison.before_step(&world).unwrap();
-    world.step();
-    comparison.after_step(&world).unwrap();
-    comparison.before_step(&world).unwrap();
-    world.bodies[far].set_translation(Vector::new(0.9, 0.0, 0.0), true);
-    world.step();
-    let mismatch = comparison.after_step(&world).unwrap_err();
-    assert!(matches!(mismatch, Mismatch { step: 1, only_ours: false, fat: true, .. }), "{mismatch:?}");
-    assert_eq!(mismatch.pair, [near_cube, far_cube]);
-    let told = mismatch.to_string();
-    assert!(
-        told.starts_with("step 1, fat AABBs: rapier has the pair of colliders 0 and 1, Sapwise lacks it"),
-        "{told}"
-    );
-}
-
-#[test]
 fn a_seed_gives_the_same_boxes_again_and_another_one_others() {
     let record = |seed| course(Settings { bodies: 60, seed }, 120).1;
     assert_eq!(record(5), record(5));
@@ -100,13 +75,13 @@ fn the_command_records_what_it_compares() {
     let (_, recording) = course(Settings { bodies: 30, seed: 7 }, 90);
     let file = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("recorded.npy");
     let run = |path: &str| {
-        let words = ["--frames", "90", "--bodies", "30", "--seed", "7", "--quiet", "--record", path];
+        let words = ["--frames", "90", "--bodies", "30", "--seed", "7", "--record", path];
         Command::new(env!("CARGO_BIN_EXE_sapwise-example-rapier3d")).args(words).output().unwrap()
     };
     let done = run(file.to_str().unwrap());
     assert!(done.status.success(), "{done:?}");
     let told = String::from_utf8(done.stdout).unwrap();
-    assert!(told.starts_with("90 frames of ") && told.lines().count() == 1, "{told}");
+    assert!(told.lines().last().unwrap().starts_with("90 frames of "), "{told}");
     assert!(Frames::read(&file).unwrap().iter().eq(recording.iter().map(Vec::as_slice)), "another recording");
     let failed = run("missing/folder/s.npy");
     let error = String::from_utf8(failed.stderr).unwrap();
