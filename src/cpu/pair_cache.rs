@@ -19,6 +19,7 @@ mod width;
 
 use crate::broad_phase::{FrameKind, FrameWork};
 use crate::clock::{Instant, measured_ns};
+use crate::cpu::mean_time::is_as_many;
 use crate::cpu::tree::FAR;
 use crate::cpu::{Input, Made, Members, Outputs, Simd, Threads, Upkeep, Workers};
 use crate::registry::thread_counts;
@@ -29,10 +30,12 @@ use motion::{Motion, Work};
 use sift::Sift;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 pub(crate) use tree::GrownTree;
-use width::Width;
 
 /// Boxes for each list of kept pairs. With a cache line each they take 256 KB, which most second-level caches hold.
 const BOXES_PER_LIST: usize = 4096;
+
+/// Fewest boxes for each list if there are several. With 3000 boxes, five lists took 1.05 times as long as two.
+const SMALLEST_LIST: usize = 1024;
 
 /// The method; see the module.
 #[derive(Debug)]
@@ -40,8 +43,9 @@ struct PairCache {
     /// All workers, and the numbers of threads on which some of them run: 1, 2, 4, ... and all.
     all: Workers,
     widths: Vec<usize>,
-    /// Those of the last frame, and the number of boxes by which they are chosen.
+    /// Those of the last frame.
     workers: Workers,
+    /// The number of boxes for which costs were learned.
     fitted_for: usize,
     outputs: Outputs,
     motion: Motion,
@@ -104,7 +108,7 @@ impl BroadPhase for PairCache {
         self.fit(boxes.len());
         let started = Instant::now();
         let margin = self.motion.advise(plan, boxes);
-        self.workers = self.workers_for(margin.is_some());
+        self.workers = self.workers_for(boxes.len(), margin.is_some());
         let _frame = self.workers.frame()?;
         let kept = match margin {
             None => Kept::Incomplete,
@@ -161,16 +165,15 @@ impl PairCache {
     /// Notes the number of boxes, until it changes by a factor of two. Then the cost of a box is unknown, and nothing
     /// is kept.
     fn fit(&mut self, boxes: usize) {
-        let before = self.fitted_for;
-        if boxes <= 2 * before.max(1) && before <= 2 * boxes.max(1) {
+        if is_as_many(self.fitted_for, boxes) {
             return;
         }
         self.fitted_for = boxes;
         self.grown.forget();
-        // Keeping takes about half as long as finding from scratch.
-        self.motion.resize([boxes / 2, boxes].map(|boxes| Width::new(self.position(boxes))));
+        // Keeping takes about half as long as finding from scratch. The number may double before it is noted again.
+        self.motion.resize([boxes / 2, 2 * boxes].map(|boxes| self.position(boxes)));
         // Lists for all tasks of any width: another number of threads deals nothing out anew.
-        let tasks = self.all.fit(boxes).tasks();
+        let tasks = self.all.fit(boxes).tasks().min((boxes / SMALLEST_LIST).max(1));
         self.kept.resize_with(tasks * boxes.div_ceil(tasks * BOXES_PER_LIST).max(1), Pairs::new);
     }
 
@@ -181,11 +184,11 @@ impl PairCache {
     }
 
     /// Returns the threads of the next frame.
-    fn workers_for(&mut self, keeps: bool) -> Workers {
-        let most = self.position(self.fitted_for);
+    fn workers_for(&mut self, boxes: usize, keeps: bool) -> Workers {
+        let most = self.position(boxes);
         let prices = &mut self.motion.prices;
         let width = if keeps { prices.keepers.next(most) } else { prices.searchers.next(most) };
-        self.all.fit(self.fitted_for).at_most(self.widths[width])
+        self.all.fit(boxes).at_most(self.widths[width])
     }
 
     /// Finds the pairs among the kept ones.
@@ -427,7 +430,7 @@ mod tests {
                     100..120 => boxes.push(Aabb::cube([unit() * 25.0; 3], 0.5)),
                     _ => {}
                 }
-                method.motion.prices.keepers = Width::new(frame / 40 % 2);
+                method.motion.prices.keepers = width::Width::new(frame / 40 % 2);
                 method.find_pairs(&boxes, &mut pairs).unwrap();
                 let expected = double_loop(&boxes);
                 assert_eq!(pairs.fingerprint(), expected.fingerprint(), "{simd:?}, frame {frame}");

@@ -6,7 +6,6 @@ mod tests;
 
 use super::grown::{Changes, Margin};
 use super::prices::Prices;
-use super::width::Width;
 use crate::cpu::Wear;
 use crate::load::{Displacement, is_same_pace};
 use crate::{Aabb, FramePlan};
@@ -230,7 +229,7 @@ impl Motion {
 
     /// The number of boxes has changed by a factor of two or more: what a box costs is to be learned again. `widths`:
     /// on how many threads pairs are kept and found from scratch at first.
-    pub(super) fn resize(&mut self, widths: [Width; 2]) {
+    pub(super) fn resize(&mut self, widths: [usize; 2]) {
         self.interrupt();
         self.prices.forget(widths);
     }

@@ -80,10 +80,12 @@ impl Prices {
 
     /// Forgets what a box costs, and half of how keeping and finding from scratch compare: with a tenth of the boxes
     /// keeping may take twice as long for each, beside finding from scratch. In `uniform` that swings between 50 and
-    /// 3000 boxes, frames take 0.74 to 0.82 times as long as if all of it is remembered.
-    pub(super) fn forget(&mut self, [keepers, searchers]: [Width; 2]) {
+    /// 3000 boxes, frames take 0.74 to 0.82 times as long as if all of it is remembered. `widths`: on how many threads
+    /// pairs are kept and found from scratch at first.
+    pub(super) fn forget(&mut self, widths: [usize; 2]) {
         (self.frames, self.of_scratch, self.is_beside) = (0, MeanTime::default(), false);
-        (self.keepers, self.searchers) = (keepers, searchers);
+        self.keepers.restart(widths[0]);
+        self.searchers.restart(widths[1]);
         self.change_keeping(f64::sqrt);
     }
 
@@ -300,7 +302,7 @@ mod tests {
         (0..100).for_each(|_| assert!(prices.pays(Some(40.0), 30.0, 40.0)));
         let mut before = prices.measured();
         for _ in 0..20 {
-            prices.forget([0; 2].map(Width::new));
+            prices.forget([0; 2]);
             // The first frames after a build are cheap.
             (0..20).for_each(|k| prices.add_scratch(Some(if k < 6 { 50.0 } else { 60.0 }), 40.0));
             before = before.sqrt();

@@ -4,9 +4,8 @@
 //! threads took 0.7 times as long as one for 4000 boxes, on another 1.3 to 2.1 times for 3000. So a few frames are
 //! tried on half or twice as many threads, and what takes less time stays.
 
-/// Frames of a trial. The first wakes threads, and does not count.
-const TRIAL: usize = 1 + RECENT;
-/// Frames that are compared, by their median: a rebuild or an interruption among them says nothing.
+/// Frames that are compared, by their median: a rebuild or an interruption among them says nothing. A trial ends as
+/// soon as three of its frames say the same. A first one that wakes threads does not count.
 const RECENT: usize = 5;
 /// Share of the time that trials may cost.
 const BUDGET: f64 = 0.005;
@@ -15,15 +14,17 @@ const FIRST: u32 = 8;
 const APART: u32 = 64;
 /// What is tried stays if it takes less than this share of the time.
 const WINS: f64 = 0.97;
-/// A trial ends early once the frames after its first have lost the time of this many usual frames. One frame loses at
-/// most the second number: a breakpoint says nothing of later frames.
+/// A trial ends early once the frames that count have lost the time of this many usual frames. One frame loses at most
+/// the second number: a breakpoint says nothing of later frames.
 const MOST_LOST: f64 = 4.0;
 const MOST: f64 = 64.0;
 
 /// The number of threads, as a position in the ascending list of those that can be had.
 #[derive(Debug, Clone)]
 pub(super) struct Width {
+    /// The position if the frame has work for as many threads, and the highest one for which it has.
     now: usize,
+    most: usize,
     /// Costs of the last usual frames over what the cost model says of them, and their number.
     costs: [f64; RECENT],
     frames: usize,
@@ -36,28 +37,41 @@ pub(super) struct Width {
 #[derive(Debug, Clone, Default)]
 struct Trial {
     at: usize,
-    costs: [f64; TRIAL],
-    frames: usize,
+    /// Whether the next frame wakes threads.
+    wakes: bool,
+    /// Frames that took less time than the usual ones, and that did not.
+    won: usize,
+    lost: usize,
+    /// What all frames lost, and those that count, in usual frames.
+    cost: f64,
+    counted: f64,
 }
 
 impl Width {
     /// Begins with this position.
     pub(super) fn new(now: usize) -> Self {
-        Self { now, costs: [0.0; RECENT], frames: 0, trial: None, pause: FIRST, wider: now == 0 }
+        Self { now, most: usize::MAX, costs: [0.0; RECENT], frames: 0, trial: None, pause: FIRST, wider: now == 0 }
     }
 
     /// Returns the position for the next frame, which is at most `most`.
     pub(super) fn next(&mut self, most: usize) -> usize {
-        if self.now.max(self.trial.as_ref().map_or(0, |trial| trial.at)) > most {
-            *self = Self::new(most);
+        if most != self.most {
+            self.most = most;
+            self.resume();
         }
+        let now = self.now.min(most);
         if self.trial.is_none() && self.pause == 0 && most > 0 {
-            let wider = self.now == 0 || self.wider && self.now < most;
-            let at = if wider { self.now + 1 } else { self.now - 1 };
+            let wider = now == 0 || self.wider && now < most;
+            let at = if wider { now + 1 } else { now - 1 };
             self.wider = !wider;
-            self.trial = Some(Trial { at, ..Trial::default() });
+            self.trial = Some(Trial { at, wakes: at > now, ..Trial::default() });
         }
-        self.trial.as_ref().map_or(self.now, |trial| trial.at)
+        self.trial.as_ref().map_or(now, |trial| trial.at)
+    }
+
+    /// Begins anew for another number of boxes. How long a trial has to wait is half forgotten.
+    pub(super) fn restart(&mut self, now: usize) {
+        *self = Self { pause: FIRST.max(self.pause / 2), ..Self::new(now) };
     }
 
     /// Goes on after frames of another kind: a trial is compared with the frames just before it.
@@ -73,15 +87,18 @@ impl Width {
             self.pause = self.pause.saturating_sub(1);
             return true;
         };
-        trial.costs[trial.frames] = cost.into();
-        trial.frames += 1;
         let usual = middle(&self.costs);
-        let lost = trial.costs.map(|cost| (cost / usual - 1.0).clamp(0.0, MOST));
-        let later: f64 = lost[1..].iter().sum();
-        if trial.frames == TRIAL && middle(&trial.costs[1..]) < WINS * usual {
-            *self = Self { wider: trial.at > self.now, ..Self::new(trial.at) };
-        } else if trial.frames == TRIAL || later > MOST_LOST {
-            self.pause = APART.max(((lost[0] + later) / BUDGET) as u32);
+        let lost = (f64::from(cost) / usual - 1.0).clamp(0.0, MOST);
+        trial.cost += lost;
+        if std::mem::take(&mut trial.wakes) {
+            return false;
+        }
+        trial.counted += lost;
+        *(if f64::from(cost) < WINS * usual { &mut trial.won } else { &mut trial.lost }) += 1;
+        if trial.won > RECENT / 2 {
+            *self = Self { wider: trial.at > self.now, most: self.most, ..Self::new(trial.at) };
+        } else if trial.lost > RECENT / 2 || trial.counted > MOST_LOST {
+            self.pause = APART.max((trial.cost / BUDGET) as u32);
             self.trial = None;
         }
         false
@@ -158,10 +175,13 @@ mod tests {
     }
 
     #[test]
-    fn fewer_threads_than_before_are_obeyed_at_once() {
+    fn frames_with_less_work_use_fewer_threads_until_there_is_more() {
         let mut width = Width::new(2);
         (0..FIRST).for_each(|_| assert!(width.next(4) == 2 && width.ran(1.0)));
-        assert_eq!([width.next(4), width.next(0)], [1, 0]);
-        assert!(width.ran(1.0));
+        // A trial ends with the frames that had work for it.
+        assert_eq!(width.next(4), 1);
+        (0..100).for_each(|_| assert!(width.next(0) == 0 && width.ran(1.0)));
+        (0..FIRST).for_each(|_| assert!(width.next(4) == 2 && width.ran(1.0)));
+        assert_ne!(width.next(4), 2);
     }
 }
