@@ -315,7 +315,7 @@ impl Runner {
         if began {
             self.tell();
         }
-        self.tracker.pace.set_rest(ns.or(choice.predicted_ns).unwrap_or(1.0), self.policy.rest());
+        self.tracker.pace.set_rest(choice.predicted_ns.or(ns).unwrap_or(1.0), self.policy.rest());
         // A first frame, and one that replaced another, were chosen by little knowledge.
         if matches!(choice.reason, Reason::First | Reason::FellBack) {
             self.tracker.pace.wake();

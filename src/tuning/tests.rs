@@ -39,6 +39,7 @@ fn for_running_gives_the_fields_of_a_tree_to_pair_cache() {
         |id: &str, call_ns: f64, unit_ns: f64| cost(id, &[(Term::Call, call_ns), (Term::Objects, unit_ns)], 0.05);
     let all = |with: &[&str]| {
         let mut costs = vec![cost("brute@cpu1", 0.0, 100.0), cost("bvh@cpu1", 8000.0, 20.0)];
+        costs.push(cost("brute@cpu2", 2000.0, 50.0));
         costs.extend([cost("sap@cpu2", 40_000.0, 10.0), cost("bvh@gpu0", 1.0e6, 1.0)]);
         costs.extend(with.iter().map(|id| cost(id, 1.0e5, 19.0)));
         Tuning::from_costs(Source::Measured, "uniform", costs, &loads())
