@@ -153,6 +153,10 @@ def running(costs):
         return costs
     if not all(f"pair-cache@{a.split('@')[1]}" in known for a in replaced):
         return costs
+    threaded = {a for a in known if parts(a)[0] == "brute" and parts(a)[1] == "cpu" and a != "brute@cpu1"}
+    if threaded and "brute@cpu1" not in known:
+        return costs
+    replaced |= threaded
     return [c for c in costs if c["algorithm"] not in replaced]
 
 
