@@ -49,6 +49,6 @@ pub use report::Report;
 pub use schemas::schemas;
 pub use train::{Trained, train, without};
 pub use training::{
-    Coverage, Floor, MethodScore, Regrets, Split, StoredModel, Training, TrainingReport, Validation, read_model,
-    write_model,
+    Coverage, Floor, MethodScore, Outside, PublishedShares, Regrets, Split, StoredModel, Training, TrainingReport,
+    Validation, read_model, write_model,
 };

@@ -3,7 +3,7 @@
 use crate::label_text::kind;
 use crate::spread::percent;
 use crate::text::count;
-use crate::{Regrets, Split, Training, Validation};
+use crate::{Outside, PublishedShares, Regrets, Split, Training, Validation};
 use sapwise::algorithm::BackendClass;
 use sapwise_tune::Model;
 use sapwise_tune::hardware::with_unit;
@@ -31,14 +31,7 @@ pub fn page(model: &Model, training: &Training, notes: &[String]) -> String {
         text.push_str(SCORES);
     }
     text.push_str(&trained_on(training));
-    text.push_str("\n## Ranges\n\n`predict` warns when a parameter of a machine lies outside.\n\n");
-    let mut rows = vec![["parameter", "lowest", "highest"].map(str::to_owned).to_vec()];
-    for range in &model.ranges {
-        let name = range.parameter.to_string();
-        let [lowest, highest] = [range.min, range.max].map(|value| with_unit(&name, value));
-        rows.push(vec![name, lowest, highest]);
-    }
-    text.push_str(&markdown(&rows));
+    text.push_str(&ranges(model, training.published.as_ref()));
     text.push_str("\n## Intervals\n\n");
     text.push_str(&intervals(&training.validation));
     if !notes.is_empty() {
@@ -72,6 +65,32 @@ fn trained_on(training: &Training) -> String {
         hosts.iter().map(|((host, label), reports)| vec![(*host).to_owned(), reports.to_string(), (*label).to_owned()]),
     );
     format!("\n## Trained on\n\n{}", markdown(&rows))
+}
+
+/// Returns a table of the ranges, beside the published machines.
+fn ranges(model: &Model, published: Option<&PublishedShares>) -> String {
+    let outside = |p: &PublishedShares| {
+        let of_kind = |(outside, kind): (Outside, &str)| {
+            let Outside { machines, outside } = outside;
+            (machines > 0)
+                .then(|| format!("{} of {machines} {kind}", percent(outside as f64 / machines as f64, None, 0)))
+        };
+        let parts: Vec<String> = [(p.cpus, "CPUs"), (p.gpus, "GPUs")].into_iter().filter_map(of_kind).collect();
+        format!(" Among published machines, a known parameter lies outside on {}.", parts.join(" and on "))
+    };
+    let mut rows = vec![["parameter", "lowest", "highest", "published machines within"].map(str::to_owned).to_vec()];
+    for range in &model.ranges {
+        let name = range.parameter.clone();
+        let [lowest, highest] = [range.min, range.max].map(|value| with_unit(&name, value));
+        let within = published.and_then(|p| p.within.get(&name));
+        let within = within.map_or_else(|| "-".to_owned(), |&share| percent(share, None, 0));
+        rows.push(vec![name, lowest, highest, within]);
+    }
+    format!(
+        "\n## Ranges\n\n`predict` warns when a parameter of a machine lies outside by more than a tenth.{}\n\n{}",
+        published.map(outside).unwrap_or_default(),
+        markdown(&rows)
+    )
 }
 
 /// Returns how far predictions may be off.
@@ -203,8 +222,15 @@ mod tests {
         // A range of its own: that of the built-in model changes with each host in its training.
         let cache = model.ranges.iter_mut().find(|r| r.parameter == "cache_llc_bytes").unwrap();
         (cache.min, cache.max) = (32.0 * 1024.0 * 1024.0, 260.0 * 1024.0 * 1024.0);
-        let text = page(&model, &Training::default(), &["a note".to_owned()]);
-        assert!(text.contains("| cache_llc_bytes | 32 MiB | 260 MiB |") && text.contains("GHz"), "{text}");
+        let outside = |machines, outside| Outside { machines, outside };
+        let within = [("cache_llc_bytes".to_owned(), 0.625)].into();
+        let published = Some(PublishedShares { cpus: outside(40, 30), gpus: outside(0, 0), within });
+        let text = page(&model, &Training { published, ..Training::default() }, &["a note".to_owned()]);
+        assert!(
+            text.contains("| cache_llc_bytes | 32 MiB | 260 MiB | 62 % |") && text.contains(" GHz | - |"),
+            "{text}"
+        );
+        assert!(text.contains(" outside on 75 % of 40 CPUs.\n"), "{text}");
         assert!(text.contains("None: fewer than two") && text.ends_with("- a note\n"), "{text}");
         let coverage =
             crate::Coverage { physical_machines: 3, times_90_ln: 0.5, times: 0.91, ratios_90_ln: 0.2, ratios: 0.88 };

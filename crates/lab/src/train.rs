@@ -58,7 +58,11 @@ pub fn train(selection: Selection, name: &str, progress: &dyn Progress) -> Resul
     notes.extend(validated.notes.into_iter().filter(|note| !notes.contains(note)).collect::<Vec<_>>());
     model.ratios_90_ln = validated.validation.coverage.map(|c| c.ratios_90_ln);
     let report = |p: &Profile| TrainingReport { file: p.file.clone(), host: p.machine().to_owned(), label: p.label };
-    let training = Training { trained_on: profiles.iter().map(report).collect(), validation: validated.validation };
+    let training = Training {
+        trained_on: profiles.iter().map(report).collect(),
+        validation: validated.validation,
+        published: None,
+    };
     Ok(Trained { model, training, notes, held_out: validated.held_out })
 }
 

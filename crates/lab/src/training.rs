@@ -5,6 +5,7 @@ use sapwise_tune::Model;
 use sapwise_tune::json::{self, Format};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// The key `training` in the file of a model. Predictions don't need it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -15,6 +16,31 @@ pub struct Training {
     pub trained_on: Vec<TrainingReport>,
     /// How well each strategy did on what was held out.
     pub validation: Validation,
+    /// How many of the machines that others published lie inside; `None` without these.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub published: Option<PublishedShares>,
+}
+
+/// How many of the machines that others published lie inside the ranges of a model, or outside by at most a tenth.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct PublishedShares {
+    /// CPUs.
+    pub cpus: Outside,
+    /// GPUs.
+    pub gpus: Outside,
+    /// For each parameter with enough values: the share of them, from 0 to 1, within its range.
+    pub within: BTreeMap<String, f64>,
+}
+
+/// Published machines outside the ranges of a model.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct Outside {
+    /// All of them.
+    pub machines: usize,
+    /// Those with at least one known parameter outside.
+    pub outside: usize,
 }
 
 /// One report behind a model.

@@ -6,6 +6,7 @@ mod gpu_set;
 mod helpers;
 mod needed;
 mod predict;
+mod range;
 mod residual;
 mod scale;
 
@@ -18,6 +19,7 @@ use std::sync::Arc;
 pub use error::PredictError;
 pub use helpers::{HelpersModel, ThreadFigures};
 pub use predict::Prediction;
+pub use range::Range;
 pub use residual::GroupResidual;
 pub use scale::Scale;
 
@@ -45,18 +47,6 @@ pub struct Model {
     pub places: Arc<Places>,
     /// One cost model for each method on each class of processor.
     pub methods: Vec<MethodModel>,
-}
-
-/// Range of a hardware parameter in training.
-#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
-pub struct Range {
-    /// Name of the parameter; that of a GPU after [`GPU_PREFIX`].
-    pub parameter: String,
-    /// Lowest value.
-    pub min: f64,
-    /// Highest value.
-    pub max: f64,
 }
 
 /// The cost model of one method on one class of processor, for any number of threads or GPUs.
@@ -188,7 +178,7 @@ impl Model {
     /// Returns what makes this model unusable, if anything.
     pub fn defect(&self) -> Option<String> {
         let places = self.places.loads();
-        let is_wrong = |r: &&Range| !(r.min.is_finite() && r.max.is_finite() && r.min <= r.max);
+        let of_range = |r: &Range| Some(format!("the range of {} has {}", r.parameter, r.defect()?));
         let of_method = |m: &MethodModel| {
             let why =
                 m.fallback.as_ref().and_then(|f| self.fallback_defect(m, f)).or_else(|| m.defect(places.len()))?;
@@ -196,8 +186,8 @@ impl Model {
         };
         if self.methods.is_empty() {
             Some("it holds no method".to_owned())
-        } else if let Some(r) = self.ranges.iter().find(is_wrong) {
-            Some(format!("the range of {} has ends that are not finite or not ascending", r.parameter))
+        } else if let Some(wrong) = self.ranges.iter().find_map(of_range) {
+            Some(wrong)
         } else if self.ratios_90_ln.is_some_and(|ln| !(0.0..=50.0).contains(&ln)) {
             Some("its intervals have a width that is negative or not finite".to_owned())
         } else if let Some(position) = places.iter().position(|load| !load.is_sound()) {

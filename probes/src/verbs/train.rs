@@ -6,7 +6,7 @@ use crate::exit::{Outcome, WrongUsage};
 use crate::progress::Progress;
 use crate::terminal::Terminal;
 use crate::{interrupt, output, outputs, shell};
-use sapwise_lab::data::{Selection, read_reports, report_files};
+use sapwise_lab::data::{Published, Selection, read_reports, report_files};
 use sapwise_lab::text::count;
 use sapwise_lab::write::write_text;
 use sapwise_lab::{Trained, Training, model_card, train, write_model};
@@ -20,9 +20,12 @@ pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     let outputs: Vec<_> = [Some(&arguments.out), arguments.card.as_ref()].into_iter().flatten().collect();
     outputs::check(&files, &outputs)?;
     interrupt::listen()?;
+    // Before the work, which takes a minute.
+    let published = Published::read(&arguments.reports)?;
     let progress = Progress::new(0);
     let reports = read_reports(&files, &progress)?;
-    let Trained { model, training, mut notes, .. } = train(Selection::of(&reports), &name, &progress)?;
+    let Trained { mut model, mut training, mut notes, .. } = train(Selection::of(&reports), &name, &progress)?;
+    training.published = published.compare(&mut model);
     drop(progress);
     let doubtful = reports.iter().filter(|(_, report)| !doubts(report).is_empty()).count();
     if doubtful > 0 {

@@ -43,7 +43,7 @@ fn ranges(profiles: &[&Profile]) -> Vec<Range> {
 
 fn range(parameter: String, values: Vec<f64>) -> Option<Range> {
     let [min, max] = spread::range(&values)?;
-    Some(Range { parameter, min, max })
+    Some(Range { parameter, min, max, published: Vec::new() })
 }
 
 /// Returns the GPUs of a profile that an algorithm was timed on.

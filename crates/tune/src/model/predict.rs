@@ -1,9 +1,9 @@
 //! Predicts the cost curves of a machine from its hardware parameters.
 
 use super::gpu_set::GpuSet;
-use super::{GPU_PREFIX, MethodModel, Model, PredictError, Range};
+use super::{GPU_PREFIX, MethodModel, Model, PredictError};
 use crate::GpuHardware;
-use crate::hardware::{Hardware, with_unit};
+use crate::hardware::Hardware;
 use crate::stats::NORMAL_90;
 use sapwise::algorithm::{Backend, BackendClass, Entry, Load};
 use sapwise::internals::{Fallback, GpuKind, Work};
@@ -43,7 +43,7 @@ impl Model {
     ///
     /// Leaves out with a warning what it can't predict: a method that the model has not seen on that processor,
     /// another revision, a GPU that the hardware does not hold, a missing or implausible parameter. A machine is
-    /// extrapolated if a parameter lies outside its [range](Range).
+    /// extrapolated if a parameter lies outside its [range](super::Range).
     ///
     /// # Errors
     /// If no algorithm can be predicted, or a parameter of the machine has a value that no machine has.
@@ -213,18 +213,6 @@ impl Prediction {
                 named.push(name);
             }
         }
-    }
-}
-
-impl Range {
-    /// Returns a warning if a value lies outside by more than a tenth: two measurements of one machine differ by up
-    /// to that.
-    fn excess(&self, name: &str, of: &str, value: Option<f64>) -> Option<String> {
-        let value = value?;
-        (value < self.min / 1.1 || value > self.max * 1.1).then(|| {
-            let [value, least, most] = [value, self.min, self.max].map(|value| with_unit(name, value));
-            format!("{name}{of} is {value}, outside the {least} to {most} of training")
-        })
     }
 }
 

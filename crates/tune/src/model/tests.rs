@@ -52,7 +52,7 @@ fn method(backend: BackendClass, scale: Scale) -> MethodModel {
 }
 
 fn model(methods: Vec<MethodModel>) -> Model {
-    let range = |parameter: &str| Range { parameter: parameter.to_owned(), min: 1.0, max: 100.0 };
+    let range = |parameter: &str| Range { parameter: parameter.to_owned(), min: 1.0, max: 100.0, ..Range::default() };
     let ranges = [ParameterId::ClockMeasuredGhz.as_str(), "gpu/upload_gb_per_s", "gpu/copy_gb_per_s"].map(range);
     Model::new("test", methods, ranges.into())
 }

@@ -13,7 +13,9 @@ fn both() -> Model {
         (ParameterId::UsableCores, 2.0, 64.0),
         (ParameterId::BandwidthOneThreadGbPerS, 8.0, 50.0),
     ];
-    model.ranges = ranges.map(|(id, min, max)| Range { parameter: id.to_string(), min, max }).to_vec();
+    let range =
+        |(id, min, max): (ParameterId, _, _)| Range { parameter: id.to_string(), min, max, published: Vec::new() };
+    model.ranges = ranges.map(range).to_vec();
     model
 }
 
