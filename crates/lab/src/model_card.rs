@@ -67,30 +67,30 @@ fn trained_on(training: &Training) -> String {
     format!("\n## Trained on\n\n{}", markdown(&rows))
 }
 
-/// Returns a table of the ranges, beside the published machines.
+/// Returns a table of the ranges, beside the published machines if there are any.
 fn ranges(model: &Model, published: Option<&PublishedShares>) -> String {
-    let outside = |p: &PublishedShares| {
-        let of_kind = |(outside, kind): (Outside, &str)| {
-            let Outside { machines, outside } = outside;
-            (machines > 0)
-                .then(|| format!("{} of {machines} {kind}", percent(outside as f64 / machines as f64, None, 0)))
-        };
-        let parts: Vec<String> = [(p.cpus, "CPUs"), (p.gpus, "GPUs")].into_iter().filter_map(of_kind).collect();
-        format!(" Among published machines, a known parameter lies outside on {}.", parts.join(" and on "))
-    };
-    let mut rows = vec![["parameter", "lowest", "highest", "published machines within"].map(str::to_owned).to_vec()];
+    let mut text = "\n## Ranges\n\n`predict` warns when a parameter of a machine lies outside.".to_owned();
+    let mut rows = vec![["parameter", "lowest", "highest"].map(str::to_owned).to_vec()];
     for range in &model.ranges {
         let name = range.parameter.clone();
         let [lowest, highest] = [range.min, range.max].map(|value| with_unit(&name, value));
-        let within = published.and_then(|p| p.within.get(&name));
-        let within = within.map_or_else(|| "-".to_owned(), |&share| percent(share, None, 0));
-        rows.push(vec![name, lowest, highest, within]);
+        rows.push(vec![name, lowest, highest]);
     }
-    format!(
-        "\n## Ranges\n\n`predict` warns when a parameter of a machine lies outside by more than a tenth.{}\n\n{}",
-        published.map(outside).unwrap_or_default(),
-        markdown(&rows)
-    )
+    if let Some(published) = published {
+        let kinds = [(published.cpus, "CPUs"), (published.gpus, "GPUs")].into_iter().filter(|(of, _)| of.machines > 0);
+        let share = |of: Outside| percent(of.outside as f64 / of.machines as f64, None, 0);
+        let parts: Vec<String> = kinds.map(|(of, kind)| format!("{} of {} {kind}", share(of), of.machines)).collect();
+        text.push_str(&format!(
+            " Among published machines, a known parameter lies outside by more than a tenth on {}.",
+            parts.join(" and on ")
+        ));
+        rows[0].push("published machines within".to_owned());
+        for (row, range) in rows[1..].iter_mut().zip(&model.ranges) {
+            let within = published.within.get(&range.parameter);
+            row.push(within.map_or_else(|| "-".to_owned(), |&share| percent(share, None, 0)));
+        }
+    }
+    format!("{text}\n\n{}", markdown(&rows))
 }
 
 /// Returns how far predictions may be off.
@@ -230,7 +230,7 @@ mod tests {
             text.contains("| cache_llc_bytes | 32 MiB | 260 MiB | 62 % |") && text.contains(" GHz | - |"),
             "{text}"
         );
-        assert!(text.contains(" outside on 75 % of 40 CPUs.\n"), "{text}");
+        assert!(text.contains(" outside by more than a tenth on 75 % of 40 CPUs.\n"), "{text}");
         assert!(text.contains("None: fewer than two") && text.ends_with("- a note\n"), "{text}");
         let coverage =
             crate::Coverage { physical_machines: 3, times_90_ln: 0.5, times: 0.91, ratios_90_ln: 0.2, ratios: 0.88 };

@@ -1,5 +1,6 @@
-//! The paper's three cards in `datasets/published/` hold what its Figure 9 prints.
+//! The paper's three cards in `datasets/published/` hold what its Figure 9 prints, and `machines.csv` can be read.
 
+use sapwise_lab::data::Published;
 use sapwise_lab::report::{self, Label, Report};
 use sapwise_tune::hardware::{GpuParameterId, How, ParameterId};
 use std::collections::BTreeSet;
@@ -71,4 +72,17 @@ fn no_published_card_is_taken_for_a_measured_machine() {
         report.hardware.machine.physical_id
     });
     assert_eq!(ids.iter().collect::<BTreeSet<_>>().len(), FIGURE_9.len());
+}
+
+#[test]
+fn published_machines_give_ranges_deciles() {
+    let datasets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets");
+    let mut model = sapwise_tune::Model::built_in().unwrap();
+    let shares = Published::read(&[datasets]).unwrap().compare(&mut model).unwrap();
+    assert!(shares.cpus.machines > 700 && shares.gpus.machines > 70, "{shares:?}");
+    assert_eq!(model.defect(), None);
+    for name in ["cache_llc_bytes", "gpu/read_gb_per_s"] {
+        let range = model.ranges.iter().find(|range| range.parameter == name).unwrap();
+        assert!(range.published.len() == 11 && shares.within.contains_key(name), "{name}");
+    }
 }

@@ -104,7 +104,8 @@ pub(crate) struct Predict {
 Example:
   sapwise train datasets/ --out mine.json --card mine.md")]
 pub(crate) struct Train {
-    /// Reports, or folders: all *.json files in them are reports.
+    /// Reports, or folders: all *.json files in them are reports. The machines in published/machines.csv of a folder
+    /// show how unusual others are.
     #[arg(required = true, value_name = "R.json")]
     pub(crate) reports: Vec<PathBuf>,
     /// Where the model goes.

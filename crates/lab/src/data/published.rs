@@ -35,7 +35,8 @@ impl Published {
         Ok(all)
     }
 
-    /// Gives the ranges of a model their deciles. Returns how many machines lie inside, or `None` if there is none.
+    /// Gives the ranges of a model their deciles. Returns how many machines lie inside, or
+    /// `None` if there is none with a known parameter.
     pub fn compare(&self, model: &mut Model) -> Option<PublishedShares> {
         let mut shares = PublishedShares::default();
         for range in &mut model.ranges {
@@ -48,7 +49,7 @@ impl Published {
         }
         shares.cpus = self.outside(&model.ranges, false);
         shares.gpus = self.outside(&model.ranges, true);
-        (!self.0.is_empty()).then_some(shares)
+        (shares.cpus.machines + shares.gpus.machines > 0).then_some(shares)
     }
 
     fn values(&self, parameter: &str) -> impl Iterator<Item = f64> {
