@@ -24,11 +24,10 @@ import xml.etree.ElementTree
 CLPEAK = "18c668f1c940663e62eed5bcc3e460ac541ea4b1"
 SPARECORES = "e8749bef991dfd1c531e84f09c2882945064a18d"
 CPU = ["usable_cores", "cache_llc_bytes", "simd_lanes"]
-GPU = ["gpu/read_gb_per_s", "gpu/upload_gb_per_s", "gpu/download_gb_per_s", "gpu/dispatch_ns"]
-GPU += ["gpu/arithmetic_gflop_per_s"]
+GPU = ["gpu/read_gb_per_s", "gpu/upload_gb_per_s", "gpu/download_gb_per_s", "gpu/arithmetic_gflop_per_s"]
 HEADINGS, TESTS = ["Global memory", "Single-precision"], ["global_memory_bandwidth", "single_precision_compute"]
-LABELS = ["enqueueWriteBuffer", "enqueueReadBuffer", "Kernel launch latency"]
-METRICS = ["enqueuewritebuffer", "enqueuereadbuffer", "dispatch"]
+LABELS = ["enqueueWriteBuffer", "enqueueReadBuffer"]
+METRICS = ["enqueuewritebuffer", "enqueuereadbuffer"]
 NO_GPU = re.compile("Processor|CPU|APU|XEON|Ryzen|pthread|cpu-|llvmpipe|Many Integrated Core")
 # Layers over the driver of the vendor: their files count only if a GPU has no other.
 LAYERS = re.compile("Portable_Computing_Language|Mesa|clvk")
@@ -62,7 +61,7 @@ def of_log(text):
         below = (re.search(f"{heading}.*\n((?: *float.*\n)+)", part) for heading in HEADINGS)
         read, arithmetic = (re.findall(r": ([0-9.]+)", found[1]) if found else [] for found in below)
         return [read, *(re.findall(f"{label} *: ([0-9.]+)", part) for label in LABELS), arithmetic]
-    return [[]] * 5
+    return [[]] * 4
 
 
 def of_xml(text):
@@ -73,7 +72,7 @@ def of_xml(text):
             tests = (run.iterfind(f".//test[@name='{name}']/metric") for name in TESTS)
             read, arithmetic = ([m.text for m in metrics if m.text] for metrics in tests)
             return [read, *([text for name, text in metrics if name == label] for label in METRICS), arithmetic]
-    return [[]] * 5
+    return [[]] * 4
 
 
 def gpus(git):
@@ -81,7 +80,6 @@ def gpus(git):
     for path, text in sorted(files(git, CLPEAK, "results/"), key=lambda file: bool(LAYERS.search(file[0]))):
         found = of_xml(text) if path.endswith(".xml") else of_log(text)
         values = [max(map(float, numbers), default=0) for numbers in found]
-        values[3] = round(1000 * values[3])  # From µs.
         name = VARIANT.sub("", path.rsplit("/", 1)[1].rsplit(".", 1)[0]).replace("_", " ").strip()
         if any(values):
             known = {key: value for key, value in zip(GPU, values) if value > 0}

@@ -67,28 +67,24 @@ fn trained_on(training: &Training) -> String {
     format!("\n## Trained on\n\n{}", markdown(&rows))
 }
 
-/// Returns a table of the ranges, beside the published machines if there are any.
+/// Returns a table of the ranges, and how many published machines lie inside if there are any.
 fn ranges(model: &Model, published: Option<&PublishedShares>) -> String {
     let mut text = "\n## Ranges\n\n`predict` warns when a parameter of a machine lies outside.".to_owned();
-    let mut rows = vec![["parameter", "lowest", "highest"].map(str::to_owned).to_vec()];
-    for range in &model.ranges {
-        let name = range.parameter.clone();
-        let [lowest, highest] = [range.min, range.max].map(|value| with_unit(&name, value));
-        rows.push(vec![name, lowest, highest]);
-    }
     if let Some(published) = published {
         let kinds = [(published.cpus, "CPUs"), (published.gpus, "GPUs")].into_iter().filter(|(of, _)| of.machines > 0);
         let share = |of: Outside| percent(of.outside as f64 / of.machines as f64, None, 0);
         let parts: Vec<String> = kinds.map(|(of, kind)| format!("{} of {} {kind}", share(of), of.machines)).collect();
+        let within = published.within.iter().map(|(name, &share)| format!("{name} {}", percent(share, None, 0)));
         text.push_str(&format!(
-            " Among published machines, a known parameter lies outside by more than a tenth on {}.",
-            parts.join(" and on ")
+            " Among published machines, a known parameter lies outside by more than a tenth on {}. Within: {}.",
+            parts.join(" and on "),
+            Vec::from_iter(within).join(", ")
         ));
-        rows[0].push("published machines within".to_owned());
-        for (row, range) in rows[1..].iter_mut().zip(&model.ranges) {
-            let within = published.within.get(&range.parameter);
-            row.push(within.map_or_else(|| "-".to_owned(), |&share| percent(share, None, 0)));
-        }
+    }
+    let mut rows = vec![["parameter", "lowest", "highest"].map(str::to_owned).to_vec()];
+    for range in &model.ranges {
+        let [lowest, highest] = [range.min, range.max].map(|value| with_unit(&range.parameter, value));
+        rows.push(vec![range.parameter.clone(), lowest, highest]);
     }
     format!("{text}\n\n{}", markdown(&rows))
 }
@@ -227,10 +223,10 @@ mod tests {
         let published = Some(PublishedShares { cpus: outside(40, 30), gpus: outside(0, 0), within });
         let text = page(&model, &Training { published, ..Training::default() }, &["a note".to_owned()]);
         assert!(
-            text.contains("| cache_llc_bytes | 32 MiB | 260 MiB | 62 % |") && text.contains(" GHz | - |"),
+            text.contains("| cache_llc_bytes | 32 MiB | 260 MiB |") && text.contains("Within: cache_llc_bytes 62 %."),
             "{text}"
         );
-        assert!(text.contains(" outside by more than a tenth on 75 % of 40 CPUs.\n"), "{text}");
+        assert!(text.contains(" outside by more than a tenth on 75 % of 40 CPUs. Within"), "{text}");
         assert!(text.contains("None: fewer than two") && text.ends_with("- a note\n"), "{text}");
         let coverage =
             crate::Coverage { physical_machines: 3, times_90_ln: 0.5, times: 0.91, ratios_90_ln: 0.2, ratios: 0.88 };
