@@ -127,7 +127,7 @@ fn measure(
             let ours = arguments.limit.is_none() && matches!(result, Err(sapwise::Error::TooManyPairs { .. }));
             let result = result.map_err(anyhow::Error::from);
             let result = if ours {
-                result.context("the limit comes from the free memory; set another with --limit")
+                result.context("all free memory is too little; set a --limit that says what is enough, or thin out")
             } else {
                 result
             };

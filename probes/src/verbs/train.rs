@@ -45,7 +45,7 @@ fn name(arguments: &Train) -> anyhow::Result<String> {
     let stem = || arguments.out.file_stem().map(|s| s.to_string_lossy().into_owned());
     let name = arguments.name.clone().or_else(stem).unwrap_or_default();
     if name.trim().is_empty() {
-        return Err(WrongUsage(format!("{} names no file", arguments.out.display())).into());
+        return Err(WrongUsage("the model has no name; give one with --name".to_owned()).into());
     }
     Ok(name)
 }

@@ -100,7 +100,7 @@ fn elements(descr: &str) -> String {
 
 /// A frame holds a box that every algorithm refuses.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("frame {frame}: {error}; only rows at the end of a frame may be NaN throughout, which are absent boxes")]
+#[error("frame {frame}: {error}; in a stream of frames × n × 6, rows of NaN at the end of a frame are absent boxes")]
 #[non_exhaustive]
 pub struct InvalidFrame {
     /// Position of the first such frame.

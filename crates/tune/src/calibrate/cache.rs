@@ -67,10 +67,12 @@ impl CacheFile {
     }
 }
 
-/// Everything that a tuning depends on, as text: this version, the machine, its usable cores, which threads help, the
-/// algorithms, the GPUs with their drivers, and the model.
+/// Everything that a tuning depends on, as text: this version, whether it was built for debugging, the machine, its
+/// usable cores, which threads help, the algorithms, the GPUs with their drivers, and the model.
+///
+/// Built for debugging, the probes find a tenth of the memory bandwidth.
 fn key(registry: &Registry) -> String {
-    let version = env!("CARGO_PKG_VERSION");
+    let version = (env!("CARGO_PKG_VERSION"), cfg!(debug_assertions));
     let machine = (machine(), registry.simd(), usable_cores(), registry.helpers());
     let algorithms: Vec<_> = registry.available().into_iter().map(|e| (e.id, e.revision)).collect();
     format!("{:?}", (version, machine, algorithms, gpus(registry), fnv1a(json::BUILT_IN)))
