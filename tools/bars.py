@@ -16,7 +16,7 @@ def picture(title, groups):
             wide = (WIDTH - LABELS - 70) * min(float(value) / longest, 1)
             body.append(f'<text x="{LABELS - 10}" y="{y}" text-anchor="end">{name}</text>')
             body.append(f'<rect x="{LABELS}" y="{y - 11}" width="{wide:.1f}" height="13" fill="{colour}"/>')
-            body.append(f'<text x="{LABELS + 6 + wide:.1f}" y="{y}">{"≫ " * cut}{value}</text>')
+            body.append(f'<text x="{LABELS + 6 + wide:.1f}" y="{y}">{value}{" (cut)" * cut}</text>')
         y += ROW + 8
     style = 'font-family="sans-serif" font-size="12" fill="#777"'
     head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{y}" {style}>'
