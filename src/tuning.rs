@@ -230,8 +230,8 @@ impl Tuning {
     /// The tuning with `brute` on one thread and `pair-cache` as the only built-in methods on the CPU. `pair-cache`
     /// contains `bvh`: it chooses by its own times between kept pairs and a tree from scratch. Without `sap` and
     /// `grid-sap` the best of the others takes 1.001 to 1.004 times the best of all over the reports of `datasets/`
-    /// (1.015 at the portable SIMD level). `pair-cache` takes their fields. `brute` on several threads was the fastest
-    /// at none of 1785 points with so many boxes that it uses them.
+    /// (1.015 at the portable SIMD level). `pair-cache` takes their fields. At 1785 points of 1500
+    /// boxes or more, `brute` on several threads was never the fastest.
     ///
     /// Unchanged unless it has costs of `bvh` on the CPU, and of `pair-cache` on the same numbers of threads.
     #[must_use]

@@ -171,24 +171,24 @@ impl PairCache {
         self.fitted_for = boxes;
         self.grown.forget();
         // Keeping takes about half as long as finding from scratch. The number may double before it is noted again.
-        self.motion.resize([boxes / 2, 2 * boxes].map(|boxes| self.position(boxes)));
+        self.motion.resize([boxes / 2, 2 * boxes].map(|boxes| self.position(&self.all.fit(boxes))));
         // Lists for all tasks of any width: another number of threads deals nothing out anew.
         let tasks = self.all.fit(boxes).tasks().min((boxes / SMALLEST_LIST).max(1));
         self.kept.resize_with(tasks * boxes.div_ceil(tasks * BOXES_PER_LIST).max(1), Pairs::new);
     }
 
-    /// Returns the position of the threads that a frame of `boxes` boxes keeps busy.
-    fn position(&self, boxes: usize) -> usize {
-        let threads = self.all.fit(boxes).threads();
-        self.widths.partition_point(|&width| width < threads)
+    /// Returns the position of the number of these threads.
+    fn position(&self, workers: &Workers) -> usize {
+        self.widths.partition_point(|&width| width < workers.threads())
     }
 
     /// Returns the threads of the next frame.
     fn workers_for(&mut self, boxes: usize, keeps: bool) -> Workers {
-        let most = self.position(boxes);
+        let busy = self.all.fit(boxes);
+        let most = self.position(&busy);
         let prices = &mut self.motion.prices;
         let width = if keeps { prices.keepers.next(most) } else { prices.searchers.next(most) };
-        self.all.fit(boxes).at_most(self.widths[width])
+        busy.at_most(self.widths[width])
     }
 
     /// Finds the pairs among the kept ones.

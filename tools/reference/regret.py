@@ -148,15 +148,11 @@ def of_another(costs, algorithms):
 def running(costs):
     """Returns the costs of what a program runs unless it asks for others, as `Tuning::for_running` does."""
     known = {c["algorithm"] for c in costs}
-    replaced = {a for a in known if parts(a)[0] in REPLACED and parts(a)[1] == "cpu"}
-    if not any(a.startswith("bvh@") for a in replaced):
+    on_cpu = [a for a in known if parts(a)[1] == "cpu"]
+    replaced = {a: f"pair-cache@{a.split('@')[1]}" for a in on_cpu if parts(a)[0] in REPLACED}
+    replaced.update((a, "brute@cpu1") for a in on_cpu if parts(a)[0] == "brute" and a != "brute@cpu1")
+    if not any(a.startswith("bvh@") for a in replaced) or not known.issuperset(replaced.values()):
         return costs
-    if not all(f"pair-cache@{a.split('@')[1]}" in known for a in replaced):
-        return costs
-    threaded = {a for a in known if parts(a)[0] == "brute" and parts(a)[1] == "cpu" and a != "brute@cpu1"}
-    if threaded and "brute@cpu1" not in known:
-        return costs
-    replaced |= threaded
     return [c for c in costs if c["algorithm"] not in replaced]
 
 

@@ -5,7 +5,7 @@ use crate::args::Pairs as Arguments;
 use crate::exit::{Outcome, WrongUsage};
 use crate::progress::{Progress, Steps as _};
 use crate::{gpus, interrupt, output, outputs, shell};
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 use sapwise::algorithm::usable_cores;
 use sapwise::error::Unavailable;
 use sapwise::{AlgorithmId, BroadPhase, Pairs, Registry};
@@ -124,12 +124,12 @@ fn measure(
             let started = Instant::now();
             let result = algorithm.find_pairs(boxes, pairs);
             samples.push(started.elapsed().as_nanos() as u64);
-            let ours = arguments.limit.is_none() && matches!(result, Err(sapwise::Error::TooManyPairs { .. }));
-            let result = result.map_err(anyhow::Error::from);
-            let result = if ours {
-                result.context("all free memory is too little; set a --limit that says what is enough, or thin out")
-            } else {
-                result
+            let result = match result {
+                Err(sapwise::Error::TooManyPairs { limit }) if arguments.limit.is_none() => Err(anyhow!(
+                    "more pairs than the {limit} that fit into half of the free memory; set another number with \
+                     --limit, or thin out the scene"
+                )),
+                result => result.map_err(anyhow::Error::from),
             };
             result.with_context(|| format!("{}, frame {k}", arguments.boxes.display()))?;
             if repetition == 0 {

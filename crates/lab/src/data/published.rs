@@ -35,8 +35,8 @@ impl Published {
         Ok(all)
     }
 
-    /// Gives the ranges of a model their deciles. Returns how many machines lie inside, or
-    /// `None` if there is none with a known parameter.
+    /// Gives the ranges of a model their deciles. Returns how many machines lie inside; `None` if
+    /// none has a known parameter.
     pub fn compare(&self, model: &mut Model) -> Option<PublishedShares> {
         let mut shares = PublishedShares::default();
         for range in &mut model.ranges {
