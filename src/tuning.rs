@@ -5,7 +5,6 @@ mod error;
 #[cfg(feature = "serde")]
 mod file;
 mod slice;
-pub(crate) mod tangents;
 
 use crate::algorithm::BackendClass;
 use crate::cost::Residual;

@@ -10,9 +10,8 @@ use super::trial::{Trial, Trials};
 use super::wait::{MOST_WAIT, Wait};
 use crate::algorithm::BackendClass;
 use crate::broad_phase::{FrameKind, FrameWork};
-use crate::cost::{Places, Residual};
+use crate::cost::{Frame, Places, Residual};
 use crate::load::Load;
-use crate::tuning::tangents::Tangents;
 use crate::tuning::{AlgorithmCost, Step, Tuning};
 use std::sync::Arc;
 
@@ -96,7 +95,6 @@ struct Kept {
 pub(super) struct Policy {
     pub(super) tuning: Tuning,
     candidates: Vec<Candidate>,
-    tangents: Tangents,
     classes: Vec<Part>,
     kept: Vec<Kept>,
     /// The first number of objects and the candidate of each step whose algorithm is a candidate, ascending.
@@ -147,7 +145,6 @@ impl Policy {
         let mut made = Self {
             candidates: candidates.collect(),
             classes: vec![Part::new(CLASS_LN); classes.len()],
-            tangents: Tangents::new(tuning.costs.len()),
             kept: states(kept),
             steps: tuning.steps.iter().filter_map(step).collect(),
             learns: true,
@@ -289,8 +286,10 @@ impl Policy {
         let growth_ln = (f64::from(load.objects.max(1)) / f64::from(self.objects.max(1))).ln().abs();
         self.objects = load.objects;
         let keep = (-growth_ln / SIZE_LN).exp();
-        let candidates = &mut self.candidates;
-        self.tangents.evaluate(load, &self.tuning.costs, |k, ns| candidates[k].predicted_ns = ns);
+        let frame = Frame::new(load);
+        for (c, cost) in self.candidates.iter_mut().zip(&self.tuning.costs) {
+            c.predicted_ns = cost.curve.cost_of(&frame);
+        }
         for k in 0..self.candidates.len() {
             let Candidate { usable: true, predicted_ns: ns, leader, .. } = self.candidates[k] else { continue };
             self.candidates[leader].predicted_ns = self.candidates[leader].predicted_ns.min(ns);
