@@ -35,7 +35,7 @@ print(wrong)
 
 def test_python_runs_while_a_frame_does():
     script = """
-boxes = cubes(300_000, seed=1)
+boxes = cubes(1_000_000, seed=1)
 sapwise.pairs(boxes)
 steps, done = 0, threading.Event()
 def work():
@@ -46,7 +46,8 @@ while not done.is_set():
     steps += 1; time.sleep(0.001)
 thread.join(); print(steps)
 """
-    assert int(run(HEAD + script)) > 20
+    # If a frame kept the interpreter, there would be about one step between two frames.
+    assert int(run(HEAD + script)) > 12
 
 
 def test_python_runs_while_measurements_of_unclosed_objects_end():
