@@ -307,6 +307,4 @@ impl Tuning {
 }
 
 #[cfg(test)]
-use tests::drawn;
-#[cfg(test)]
 mod tests;

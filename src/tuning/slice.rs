@@ -178,7 +178,7 @@ fn between(a: &Load, b: &Load, share: f64) -> Load {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tuning::drawn::drawn;
+    use crate::tuning::tests::drawn::drawn;
     use crate::tuning::{CostCurve, CostTerm, Term};
 
     #[test]
