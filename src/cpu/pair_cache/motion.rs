@@ -38,8 +38,17 @@ const JUMP: f32 = 0.5;
 const FRESH: f32 = 0.02;
 const FEWEST_FRESH: u64 = 64;
 
+/// Where the boxes that leave cost less than this share of what the kept pairs do, they shake in place or have come to
+/// rest. Then no rate of leaving says how many would leave a smaller grown box, and half the margin is tried.
+const RARE: f32 = 0.5;
+
 /// Frames over which grown boxes that are too wide are made smaller.
 const SHRINKING: usize = 64;
+
+/// Half the margin is given up once it has cost more than this share of a rebuild, and the next trial waits this many
+/// times as long.
+const LOST_BY_TRIAL: f32 = 0.1;
+const PATIENCE: f32 = 4.0;
 
 /// Frames for which the promised cost counts in the mean cost of a frame.
 const PROMISED: f32 = 16.0;
@@ -59,6 +68,8 @@ const NODES: f32 = 12.0;
 pub(super) struct Work {
     /// Kept pairs that were tested.
     pub(super) kept_pairs: usize,
+    /// Boxes that counted as having left, to get a smaller grown box.
+    pub(super) grown_again: usize,
     /// Nodes of the tree that were looked at for boxes that left.
     pub(super) nodes: u64,
     /// Whether tree and pairs were made again.
@@ -108,11 +119,25 @@ struct Keeping {
     /// would.
     grown: f32,
     missed: f32,
+    narrowing: Option<Narrowing>,
+    /// How many times the price of a rebuild that has to be, after trials that failed.
+    patience: f32,
     /// Frames since keeping began.
     frames: u32,
     /// Cost for each box in the last frame, and in the mean frame, rebuilds included.
     work: f32,
     mean_work: f32,
+}
+
+/// A trial of half the margin.
+#[derive(Debug, Clone, Copy)]
+struct Narrowing {
+    /// The margin before, the share that left, and the cost for each box.
+    margin: f32,
+    leaving: f32,
+    cost: f32,
+    /// What the trial has cost for each box beyond that.
+    lost: f32,
 }
 
 impl Keeping {
@@ -143,7 +168,22 @@ impl Keeping {
     /// Whether it would have saved by now what it costs to grow all boxes again. Boxes that come to rest never leave
     /// by themselves: without this their wide grown boxes would stay for ever, and with them five times the pairs.
     fn is_too_wide(&self, objects: usize) -> bool {
-        self.missed > cost::rebuild(cost::far(objects), self.kept * self.narrower_keeps())
+        self.missed > self.patience * cost::rebuild(cost::far(objects), self.kept * self.narrower_keeps())
+    }
+
+    /// Learns from a frame that cost this much for each box, without the boxes that were grown again, whether half the
+    /// margin is the better one. Boxes that shake in place stay within a margin for ever and leave half of it in every
+    /// few frames.
+    fn judge_narrowing(&mut self, cost: f32, rebuild: f32) {
+        let Some(trial) = &mut self.narrowing else { return };
+        trial.lost += cost - trial.cost;
+        if trial.lost > LOST_BY_TRIAL * rebuild {
+            (self.margin.share, self.leaving) = (trial.margin, trial.leaving);
+            self.patience *= PATIENCE;
+            (self.wide_from, self.narrowing) = (None, None);
+        } else if trial.lost < -rebuild {
+            (self.patience, self.narrowing) = (1.0, None);
+        }
     }
 }
 
@@ -275,6 +315,8 @@ impl Motion {
             return 0..0;
         };
         let first = keeping.wide_from.unwrap_or_else(|| {
+            let Keeping { grown: margin, leaving, cost, .. } = *keeping;
+            keeping.narrowing = Some(Narrowing { margin, leaving, cost, lost: 0.0 });
             (keeping.margin.share, keeping.missed) = (keeping.narrower(), 0.0);
             0
         });
@@ -311,8 +353,8 @@ impl Motion {
         let (left, kept, rebuilt) = (share(changes.left), share(did.kept_pairs), did.rebuilt);
         let outgrown = share(changes.left - changes.jumped);
         let nodes = did.nodes as f32 / changes.left.max(1) as f32;
-        let leaving = if left > 0.0 { cost::AGAIN + cost::left(far, nodes) * left } else { 0.0 };
-        let work = if rebuilt { cost::rebuild(far, kept) } else { leaving };
+        let leaving = |left: f32| if left > 0.0 { cost::AGAIN + cost::left(far, nodes) * left } else { 0.0 };
+        let work = if rebuilt { cost::rebuild(far, kept) } else { leaving(left) };
         k.tests = cost::tests(far, kept);
         let now = k.tests + work;
         k.cost += (now - k.cost) / 16.0;
@@ -322,13 +364,15 @@ impl Motion {
         // Boxes that move alike leave together, in frames in which all is made again.
         k.leaving += if k.frames > 0 { (outgrown - k.leaving) / LEARNING } else { 0.0 };
         if rebuilt {
-            (k.grown, k.missed, k.wide_from) = (k.margin.share, 0.0, None);
+            (k.grown, k.missed, k.wide_from, k.narrowing) = (k.margin.share, 0.0, None, None);
             k.wear = Wear::default();
         } else {
             k.wear.note(changes.left as u64, did.nodes, FEWEST_FRESH.max((FRESH * objects as f32) as u64));
             k.grown += (k.margin.share - k.grown) * left.min(1.0);
             k.nodes += if changes.left > 0 { (nodes - k.nodes) / LEARNING } else { 0.0 };
             k.missed = (k.missed + k.narrower_saves(far, kept, outgrown)).max(0.0);
+            let by_themselves = share(changes.left.saturating_sub(did.grown_again));
+            k.judge_narrowing(k.tests + leaving(by_themselves), cost::rebuild(far, k.kept));
         }
         // At the best margin the two costs grow at the same rate: kept pairs as (1 + 2 m)^3, boxes that leave as m^-p
         // with p between 1, for those that fly straight on, and 2, for those that wander.
@@ -339,7 +383,7 @@ impl Motion {
         );
         if leave > 1.2 * keep {
             k.margin.share = (m * MARGIN_STEP).min(MARGINS[MARGINS.len() - 1]);
-        } else if keep > 1.2 * leave {
+        } else if keep > 1.2 * leave && leave > RARE * keep {
             k.margin.share = (m / MARGIN_STEP).max(MARGINS[0]);
         }
         k.pace = self.told.unwrap_or(k.pace);
@@ -387,6 +431,8 @@ impl Motion {
             wide_from: None,
             grown: best,
             missed: 0.0,
+            narrowing: None,
+            patience: 1.0,
             frames: 0,
             work: cost(best),
             mean_work: cost(best),

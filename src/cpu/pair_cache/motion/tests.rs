@@ -52,7 +52,7 @@ fn keeping_begins_again_when_boxes_that_moved_too_far_come_to_rest() {
     assert!(!keeps(&mut motion, 0.05) && keeps(&mut motion, 0.05));
     // More boxes leave than was promised.
     let changes = Changes { left: 400, jumped: 0, new: 0..0, gone: 0..0 };
-    let did = Work { kept_pairs: 500, nodes: 4800, rebuilt: false };
+    let did = Work { kept_pairs: 500, grown_again: 0, nodes: 4800, rebuilt: false };
     while motion.learn(1000, &changes, &did, None) {}
     motion.stop(false);
     assert!((0..50).all(|_| !keeps(&mut motion, 0.05)));
@@ -84,7 +84,7 @@ fn boxes_are_sorted_anew_when_queries_have_become_expensive() {
     motion.found(1000, 0);
     (0..2).for_each(|_| _ = motion.advise(&FramePlan::default(), &boxes));
     let changes = Changes { left: 10, jumped: 0, new: 0..0, gone: 0..0 };
-    let did = |nodes: u64, rebuilt| Work { kept_pairs: 1000, nodes: nodes * 10, rebuilt };
+    let did = |nodes: u64, rebuilt| Work { kept_pairs: 1000, grown_again: 0, nodes: nodes * 10, rebuilt };
     motion.learn(1000, &changes, &did(0, true), None);
     let mut frames = |nodes: u64| {
         (0..20).for_each(|_| _ = motion.learn(1000, &changes, &did(12, false), None));
@@ -142,7 +142,7 @@ fn a_margin_that_keeps_too_many_pairs_is_halved_and_one_that_too_many_leave_is_n
         };
         let first = keep(&mut motion);
         let changes = Changes { left, jumped: 0, new: 0..0, gone: 0..0 };
-        let did = Work { kept_pairs, nodes: 12 * left as u64, rebuilt: false };
+        let did = Work { kept_pairs, grown_again: 0, nodes: 12 * left as u64, rebuilt: false };
         assert!((0..100).any(|_| !motion.learn(1000, &changes, &did, None)), "it never ceases to pay");
         motion.stop(false);
         keep(&mut motion) / first
