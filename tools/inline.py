@@ -21,6 +21,7 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 TABLE = ROOT / "results/inline.csv"
+COMMIT = subprocess.check_output(["git", "-C", ROOT, "rev-parse", "--short=8", "HEAD"], text=True).strip()
 LEARNED = "300"
 TUNINGS = ["predicted", "measured", "other"]
 STEADY = ["uniform", "fast", "clustered", "slab", "mixed", "resting", "brownian", "free-fall", "gravity"]
@@ -52,6 +53,7 @@ def row(host, tuning, scene, answer, part):
     return {
         "host": host,
         "date": datetime.date.today().isoformat(),
+        "commit": COMMIT,
         "tuning": tuning,
         "scene": scene,
         "repeats": answer["repeats"],

@@ -83,7 +83,7 @@ def readme_peers():
     ahead = [sum(ratio > 1 for ratio in ratios) for ratios in (many, few)]
     return text + (
         f"\nFrom 1000 boxes on, it is {geometric_mean(many):.1f}× as fast as the fastest peer (geometric mean) "
-        f"and ahead in {ahead[0]} of {len(many)} cells, all but {', '.join(behind)}. "
+        f"and ahead in {ahead[0]} of {len(many)} cells, but not in all of {', '.join(behind)}. "
         f"At 100 boxes it is {geometric_mean(few):.1f}× as fast and ahead in {ahead[1]} of {len(few)}; "
         f"worst is `{worst[1]}` ({digits(worst[0], 2)}).\n"
     )
@@ -111,8 +111,8 @@ def page_of_peers():
             [scenario, *(digits(r) if r else "-" for r in ratios), digits(float(p99) / float(p50)) if p99 else "-"]
         )
     return (
-        "# Beside peers\n\nTime of the fastest peer over that of `adaptive`, one thread, by number of boxes; "
-        "median over the frames. "
+        "# Beside peers\n\nTime of the fastest peer over that of `adaptive`, one thread, by boxes; "
+        "median over frames. "
         "Last: p99 over median of `pair-cache` at 10 000.\n\n"
         + table(["scenario", *map(size, sizes), "p99"], body)
         + "\n"
@@ -264,7 +264,7 @@ def inline_table():
         worst = max(runs, key=lambda r: float(r["over_single"]))
         body.append(
             [
-                f"{host}, {runs[0]['date']}",
+                f"{host}, {runs[0]['date']}, {runs[0]['commit']}",
                 tuning,
                 len(runs),
                 f"{geometric_mean(single):.3f}",
@@ -283,7 +283,7 @@ def on_the_same_scenes(groups):
         same = [float(r["over_single"]) for r in groups[host, "predicted"] if r["scene"] in scenes]
         if tuning != "predicted":
             told.append(f"{host}, `{tuning}`: {geometric_mean(same):.3f}")
-    return f"\n`predicted` in the runs of {'; '.join(told)}.\n"
+    return f"\n`predicted` over the same scenes: {'; '.join(told)}.\n"
 
 
 def inline_sentence():
@@ -407,7 +407,7 @@ def blind_table():
     today, older = blind(whole=True)
     body = [[row[k] for k in ("host", "date", "model_trained_on", "model_commit")] + [regret_of(row)] for row in today]
     ranges = [sorted(float(row[k]) for row in older) for k in ("regret_all_percent", "regret_games_percent")]
-    told = "{} earlier reports, with the algorithms and models of their day: {} to {} ({} to {}) %.".format(
+    told = "{} earlier whole-machine tests, with the algorithms and models of their day: {} to {} ({} to {}) %.".format(
         len(older), *(end for values in ranges for end in (values[0], values[-1]))
     )
     return table(["host", "date", "model trained on", "its commit", "regret, %"], body) + "\n" + told + "\n"

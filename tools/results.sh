@@ -10,7 +10,9 @@ cd "$(dirname "$0")/.."
 folder=${CARGO_TARGET_DIR:-target}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-note() { tools/measured.py "$1" "tools/results.sh $2" "$3"; }
+# With what was set: another run takes the same.
+set_to=$(env | sed -n '/^SAPWISE_RESULTS=/!s/^SAPWISE_[A-Z]*=.*/& /p' | sort | tr -d '\n')
+note() { tools/measured.py "$1" "${set_to}tools/results.sh $2" "$3"; }
 host() {
   [ -n "${SAPWISE_HOST:-}" ] && return
   echo "results: name this machine's folder in datasets/ with SAPWISE_HOST" >&2
@@ -106,7 +108,7 @@ predict() {
 known="peers gpu inline c python avian web probes heldout influence sizes builds memory predict"
 if [ "${1:-}" != --splice ]; then
   # shellcheck disable=SC2086
-  [ $# -gt 0 ] || set -- ${known/gpu /}
+  [ $# -gt 0 ] || { host && set -- ${known/gpu /}; }
   for what; do
     case " $known " in
     *" $what "*) "$what" ;;

@@ -119,7 +119,7 @@ pub(crate) fn prediction(hardware: &Hardware, tuning: &Tuning, terminal: Termina
     let cores = hardware.value(ParameterId::UsableCores).unwrap_or(1.0) as usize;
     let mut text = format!("{}, {}, {}\n\n", machine.cpu, count(cores, "core"), machine.simd);
     text += &steps(tuning, terminal, false);
-    text += "@cpu2: on 2 threads. A program chooses anew in each frame, by its own boxes.\n";
+    text += "@cpu1: on one thread. A program chooses anew in each frame, by its own boxes.\n";
     let warning = match &tuning.warnings[..] {
         [] => return text,
         many if tuning.extrapolated => {

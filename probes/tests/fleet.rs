@@ -71,7 +71,7 @@ fn each_kind_of_machine_gets_a_tuning_by_its_identity() {
         command
     };
     let told = failure_text(predict(&["--out"]).arg(&out));
-    assert!(told.contains("2 tunings written") && told.contains("were cut short or disturbed"), "{told}");
+    assert!(told.contains("2 tunings written") && told.contains("no tuning: other programs disturbed it"), "{told}");
     let first = fs::read_to_string(reports.path().join("first.json")).unwrap();
     let first = sapwise_lab::report::read(&first).unwrap().value;
     let own = out.join(first.hardware.machine.tuning_file(2, &[]));

@@ -193,7 +193,7 @@ pub(crate) struct Check {
     pub(crate) json: bool,
 }
 
-/// Writes the JSON Schemas of reports, models, tunings and caches.
+/// Writes the JSON Schemas of reports, models and tunings.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  sapwise schema --out schemas")]
 pub(crate) struct Schema {

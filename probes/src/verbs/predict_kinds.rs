@@ -43,11 +43,13 @@ pub(super) fn run(folder: &Path, arguments: &Predict, algorithms: &Algorithms) -
     for (file, (kind, best)) in choose(&reports, arguments) {
         interrupt::check()?;
         let machine = format!("{}, {}, {}", kind.cpu, count(kind.cores as usize, "core"), kind.simd);
-        let Some((name, report)) = best.map(|k| &reports[k]) else {
-            without += 1;
-            let why = "all of its reports were cut short or disturbed";
-            rows.push(vec![file, machine, "-".to_owned(), terminal.bad(why)]);
-            continue;
+        let (name, report) = match best {
+            Ok(best) => &reports[best],
+            Err(why) => {
+                without += 1;
+                rows.push(vec![file, machine, "-".to_owned(), terminal.bad(&format!("no tuning: {why}"))]);
+                continue;
+            }
         };
         let tuning = prediction::of_report(report, arguments, &model, algorithms).with_context(|| name.clone())?;
         write_text(&out.join(&file), &json::write_tuning(&tuning)?)?;
@@ -63,26 +65,27 @@ pub(super) fn run(folder: &Path, arguments: &Predict, algorithms: &Algorithms) -
     Ok(if without == 0 { Outcome::Done } else { Outcome::Failed })
 }
 
-/// For each file name the kind of machine, and its report whose times are nearest to those of the others, if it has any
-/// that was neither cut short nor disturbed.
+/// For each file name the kind of machine, and its report whose times are nearest to those of the others; or why its
+/// reports can't stand for it.
 ///
 /// Hosts that only their clock tells apart have one file: that of the kind with the most reports.
-fn choose(reports: &[(String, Report)], arguments: &Predict) -> BTreeMap<String, (Kind, Option<usize>)> {
+fn choose(reports: &[(String, Report)], arguments: &Predict) -> BTreeMap<String, (Kind, Result<usize, &'static str>)> {
     let mut kinds: BTreeMap<Kind, Vec<usize>> = BTreeMap::new();
     for (k, (_, report)) in reports.iter().enumerate() {
         kinds.entry(Kind::of(report)).or_default().push(k);
     }
     let mut kinds: Vec<(Kind, Vec<usize>)> = kinds.into_iter().collect();
     kinds.sort_by_key(|(_, members)| Reverse(members.len()));
-    let mut chosen: BTreeMap<String, (Kind, Option<usize>)> = BTreeMap::new();
+    let mut chosen: BTreeMap<String, (Kind, Result<usize, &'static str>)> = BTreeMap::new();
     for (kind, members) in kinds {
         let hardware = &reports[members[0]].1.hardware;
         let gpus: Vec<GpuIdentity> =
             hardware.gpus.iter().map(|g| g.gpu.clone()).filter(|g| arguments.gpus.takes(g)).collect();
         let file = hardware.machine.tuning_file(kind.cores, &gpus);
-        if !chosen.get(&file).is_some_and(|(_, best)| best.is_some()) {
+        if !chosen.get(&file).is_some_and(|(_, best)| best.is_ok()) {
+            let why = members.iter().find_map(|&k| unusable(&reports[k].1)).unwrap_or_default();
             let usable = members.into_iter().filter(|&k| unusable(&reports[k].1).is_none());
-            chosen.insert(file, (kind, nearest(reports, &usable.collect::<Vec<usize>>())));
+            chosen.insert(file, (kind, nearest(reports, &usable.collect::<Vec<usize>>()).ok_or(why)));
         }
     }
     chosen

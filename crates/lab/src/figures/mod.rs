@@ -129,9 +129,10 @@ fn tick(value: &f64) -> String {
 
 /// A chart with its title above and room for the numbers on both axes.
 fn chart<'a, 'b>(area: &'a Area<'b>, title: &str) -> Result<ChartBuilder<'a, 'b, SVGBackend<'b>>> {
-    text(area, title, (70, 10), HPos::Left)?;
+    text(area, title, (76, 10), HPos::Left)?;
     let mut chart = ChartBuilder::on(area);
-    chart.margin_top(22).margin_right(16).x_label_area_size(44).y_label_area_size(70);
+    // Without a margin at the left the name of the axis loses its edge.
+    chart.margin_top(22).margin_right(16).margin_left(6).x_label_area_size(44).y_label_area_size(70);
     Ok(chart)
 }
 

@@ -67,8 +67,10 @@ struct Material {
 /// # Errors
 /// When a report can't be read, the folder holds something else or takes no file, and when the user asked to stop.
 pub fn study(reports: &[PathBuf], out: &Path, made: &str, progress: &dyn Progress) -> Result<Summary> {
+    let reports = read_reports(reports, progress)?;
+    // Only now: reports that can't be read leave no empty folder.
     prepare(out)?;
-    let material = Material::new(read_reports(reports, progress)?, progress)?;
+    let material = Material::new(reports, progress)?;
     progress.message("drawing");
     let mut page = Page::default();
     page.files = vec![

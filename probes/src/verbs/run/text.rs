@@ -1,7 +1,7 @@
 //! The answer of a run, as JSON and as text.
 
 use super::tuning::{Origin, OriginKind};
-use crate::args::{Run, Scene};
+use crate::args::Run;
 use crate::replay::{Outcome, Part, ReplaySettings, Times, WINDOW};
 use crate::shell;
 use crate::terminal::Terminal;
@@ -114,6 +114,9 @@ impl Answer<'_> {
                 _ => "It chooses on one half of the repeats and is timed on the other.",
             }
         ));
+        if outcome.frames.len() < WINDOW {
+            lines.push("So few frames tell little: the first ones build what later ones keep.".to_owned());
+        }
         lines.extend(outcome.foreign_load.map(|load| format!("Other programs took {:.0} % of the CPU.", load * 100.0)));
         lines.extend(self.warnings().iter().map(|warning| format!("{} {warning}", terminal.warning("warning:"))));
         if outcome.interrupted {
@@ -121,7 +124,7 @@ impl Answer<'_> {
         }
         let written = [("Recorded", &arguments.record), ("Traced", &arguments.trace), ("Drawn", &arguments.plot)];
         lines.extend(written.into_iter().filter_map(|(verb, p)| Some(format!("{verb} in {}.", p.as_ref()?.display()))));
-        lines.push(shell::next(&next_step(arguments, self.origin)));
+        lines.extend(next_step(arguments, self.origin).map(|words| shell::next(&words)));
         lines.join("\n")
     }
 
@@ -180,15 +183,11 @@ impl Answer<'_> {
     }
 }
 
-/// The next command to try.
-fn next_step(arguments: &Run, origin: &Origin) -> String {
-    let scene = match &arguments.scene {
-        Scene::Scenario(scenario) => scenario.to_string(),
-        Scene::Stream(path) => shell::path(path),
-    };
+/// The next command to try, if any.
+fn next_step(arguments: &Run, origin: &Origin) -> Option<String> {
     match (origin.from, &arguments.plot) {
-        (_, None) => shell::again(&["--plot", "run.svg"]),
-        (OriginKind::Prediction, _) => format!("probe --out report.json{}", arguments.gpus.words()),
-        (_, Some(_)) => format!("run {scene}"),
+        (_, None) => Some(shell::again(&["--plot", "run.svg"])),
+        (OriginKind::Prediction, _) => Some(format!("probe --out report.json{}", arguments.gpus.words())),
+        (_, Some(_)) => None,
     }
 }
