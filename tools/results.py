@@ -113,7 +113,7 @@ def page_of_peers():
     return (
         "# Beside peers\n\nTime of the fastest peer over that of `adaptive`, one thread, by boxes; "
         "median over frames. "
-        "Last: p99 over median of `pair-cache` at 10 000.\n\n"
+        "p99: over median of `pair-cache`, 10 000.\n\n"
         + table(["scenario", *map(size, sizes), "p99"], body)
         + "\n"
         + few_frames(cells)
