@@ -83,7 +83,7 @@ def readme_peers():
     ahead = [sum(ratio > 1 for ratio in ratios) for ratios in (many, few)]
     return text + (
         f"\nFrom 1000 boxes on, it is {geometric_mean(many):.1f}× as fast as the fastest peer (geometric mean) "
-        f"and ahead in {ahead[0]} of {len(many)} cells, but not in all of {', '.join(behind)}. "
+        f"and ahead in {ahead[0]} of {len(many)} cases; the rest: {', '.join(behind)}. "
         f"At 100 boxes it is {geometric_mean(few):.1f}× as fast and ahead in {ahead[1]} of {len(few)}; "
         f"worst is `{worst[1]}` ({digits(worst[0], 2)}).\n"
     )

@@ -2,7 +2,6 @@
 
 use crate::output;
 use crate::outputs::check_writable;
-use anyhow::Context;
 use sapwise_lab::report::Report;
 use std::cell::Cell;
 use std::fs;
@@ -30,7 +29,7 @@ impl Destination {
     /// When the folder takes none, or the path is a folder itself.
     pub(crate) fn new(path: Option<&Path>) -> anyhow::Result<Self> {
         let path = path.unwrap_or(Path::new(DEFAULT)).to_path_buf();
-        check_writable(&path).context("name another file with --out")?;
+        check_writable(&path)?;
         let unfinished = match path.extension() {
             Some(extension) if extension == UNFINISHED => path.clone(),
             _ => path.with_added_extension(UNFINISHED),

@@ -82,6 +82,12 @@ fn each_kind_of_machine_gets_a_tuning_by_its_identity() {
     success(predict(&["--measured", "--out"]).arg(&out));
     let tuning = sapwise_tune::json::tuning(&fs::read_to_string(&own).unwrap()).unwrap();
     assert_eq!(tuning.source, sapwise::tuning::Source::Measured);
+    let nowhere = tunings.path().join("nowhere");
+    for name in ["first.json", "second.json", "other.json"] {
+        change(&reports.path().join(name), |report| report.label = Label::Published);
+    }
+    failure(predict(&["--out"]).arg(&nowhere), 1, &["published parameters only"]);
+    assert!(!nowhere.exists());
     failure(&mut predict(&[]), 2, &["--out"]);
     failure(predict(&["--out"]).arg(reports.path()), 2, &["holds the reports"]);
     failure(predict(&["--out"]).arg(reports.path().join("new/tunings")), 2, &["holds the reports"]);

@@ -6,10 +6,10 @@ use crate::exit::{Outcome, WrongUsage};
 use crate::progress::Progress;
 use crate::terminal::Terminal;
 use crate::{interrupt, output, outputs, prediction, shell};
-use anyhow::Context;
+use anyhow::{Context, bail};
 use sapwise_lab::data::read_reports;
 use sapwise_lab::kinds::{Kind, Times, unusable};
-use sapwise_lab::report::Report;
+use sapwise_lab::report::{Label, Report};
 use sapwise_lab::text::count;
 use sapwise_lab::write::write_text;
 use sapwise_tune::{GpuIdentity, json};
@@ -34,9 +34,13 @@ pub(super) fn run(folder: &Path, arguments: &Predict, algorithms: &Algorithms) -
     let model = prediction::model(arguments.model.as_deref())?.model;
     interrupt::listen()?;
     let progress = Progress::new(0);
-    let reports = read_reports(&[folder.to_owned()], &progress)?;
+    let mut reports = read_reports(&[folder.to_owned()], &progress)?;
     drop(progress);
-    outputs::make_folder(out)?;
+    // No program runs on a machine that somebody else published.
+    reports.retain(|(_, report)| report.label != Label::Published);
+    if reports.is_empty() {
+        bail!("{} holds published parameters only; name a folder with measured reports", folder.display());
+    }
     let terminal = Terminal::of_standard_output();
     let mut rows = vec![["tuning", "machine", "from", ""].map(str::to_owned).to_vec()];
     let mut without = 0;
@@ -52,6 +56,7 @@ pub(super) fn run(folder: &Path, arguments: &Predict, algorithms: &Algorithms) -
             }
         };
         let tuning = prediction::of_report(report, arguments, &model, algorithms).with_context(|| name.clone())?;
+        outputs::make_folder(out)?;
         write_text(&out.join(&file), &json::write_tuning(&tuning)?)?;
         let told = tuning.warnings.first().map_or(terminal.good("good"), |why| terminal.warning(why));
         rows.push(vec![file, machine, name.clone(), told]);
@@ -59,7 +64,9 @@ pub(super) fn run(folder: &Path, arguments: &Predict, algorithms: &Algorithms) -
     let mut text = terminal.table(&rows);
     let written = rows.len() - 1 - without;
     text += &format!("\n{} written to {}.\n", count(written, "tuning"), out.display());
-    text += "A program reads the one that Machine::tuning_file names and passes it to Adaptive::new.\n";
+    if written > 0 {
+        text += "A program reads the one that Machine::tuning_file names and passes it to Adaptive::new.\n";
+    }
     text += &shell::next(&format!("check {}", shell::path(folder)));
     output::print(&text)?;
     Ok(if without == 0 { Outcome::Done } else { Outcome::Failed })
