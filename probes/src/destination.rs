@@ -2,6 +2,7 @@
 
 use crate::output;
 use crate::outputs::check_writable;
+use anyhow::Context;
 use sapwise_lab::report::Report;
 use std::cell::Cell;
 use std::fs;
@@ -28,13 +29,21 @@ impl Destination {
     /// # Errors
     /// When the folder takes none, or the path is a folder itself.
     pub(crate) fn new(path: Option<&Path>) -> anyhow::Result<Self> {
-        let path = path.unwrap_or(Path::new(DEFAULT)).to_path_buf();
+        let Some(path) = path.map(Path::to_path_buf) else {
+            // Nobody named the file that is to be another.
+            check_writable(Path::new(DEFAULT)).context("name a file with --out")?;
+            return Ok(Self::writable(DEFAULT.into()));
+        };
         check_writable(&path)?;
+        Ok(Self::writable(path))
+    }
+
+    fn writable(path: PathBuf) -> Self {
         let unfinished = match path.extension() {
             Some(extension) if extension == UNFINISHED => path.clone(),
             _ => path.with_added_extension(UNFINISHED),
         };
-        Ok(Self { path, unfinished, wrote_unfinished: Cell::new(false) })
+        Self { path, unfinished, wrote_unfinished: Cell::new(false) }
     }
 
     /// Writes the report as it is now to the unfinished file, so that a power cut costs one scenario.

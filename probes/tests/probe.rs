@@ -62,7 +62,7 @@ fn a_folder_that_takes_no_file_is_told_before_measuring() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("file");
     fs::write(&file, "").unwrap();
-    failure(sapwise().args(TINY).arg("--out").arg(file.join("report.json")), 1, &["--out"]);
+    failure(sapwise().args(TINY).arg("--out").arg(file.join("report.json")), 1, &["name another"]);
 }
 
 #[cfg(all(target_os = "linux", feature = "long-tests"))]
