@@ -17,11 +17,14 @@ import os
 import pathlib
 import statistics
 import subprocess
+import sys
 import tempfile
+
+sys.dont_write_bytecode = True
+import measured  # noqa: E402
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 TABLE = ROOT / "results/inline.csv"
-COMMIT = subprocess.check_output(["git", "-C", ROOT, "rev-parse", "--short=8", "HEAD"], text=True).strip()
 LEARNED = "300"
 TUNINGS = ["predicted", "measured", "other"]
 STEADY = ["uniform", "fast", "clustered", "slab", "mixed", "resting", "brownian", "free-fall", "gravity"]
@@ -53,7 +56,7 @@ def row(host, tuning, scene, answer, part):
     return {
         "host": host,
         "date": datetime.date.today().isoformat(),
-        "commit": COMMIT,
+        "commit": measured.commit(),
         "tuning": tuning,
         "scene": scene,
         "repeats": answer["repeats"],

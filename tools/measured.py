@@ -26,15 +26,17 @@ def here():
     return f"{cpu[1] if cpu else 'unknown'} ({len(os.sched_getaffinity(0))} cores)"
 
 
+def commit():
+    """The commit that is checked out."""
+    return subprocess.check_output(["git", "rev-parse", "--short=8", "HEAD"], cwd=ROOT, encoding="utf-8").strip()
+
+
 def note(name, command, samples, machine=None):
     """Writes down where and when a file was measured."""
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short=8", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=True
-    )
     with open(RESULTS / "provenance.csv", newline="", encoding="utf-8") as file:
         known = [row for row in csv.DictReader(file) if row["file"] != name]
     known.append(
-        dict(zip(known[0], [name, machine or here(), str(datetime.date.today()), commit.stdout.strip(), samples, command]))
+        dict(zip(known[0], [name, machine or here(), str(datetime.date.today()), commit(), samples, command]))
     )
     with open(RESULTS / "provenance.csv", "w", newline="", encoding="utf-8") as file:
         out = csv.DictWriter(file, known[0], lineterminator="\n")
@@ -55,7 +57,8 @@ def study():
     note("field-map.svg", "tools/results.sh influence", drawn, host[1])
 
 
-if sys.argv[1:] == ["--study"]:
-    study()
-else:
-    note(*sys.argv[1:])
+if __name__ == "__main__":
+    if sys.argv[1:] == ["--study"]:
+        study()
+    else:
+        note(*sys.argv[1:])

@@ -11,7 +11,7 @@ folder=${CARGO_TARGET_DIR:-target}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 # With what was set: another run takes the same.
-set_to=$(env | sed -n '/^SAPWISE_RESULTS=/!s/^SAPWISE_[A-Z]*=.*/& /p' | sort | tr -d '\n')
+set_to=$(env | sed -n '/^SAPWISE_RESULTS=/!s/^SAPWISE_[A-Z_]*=.*/& /p' | sort | tr -d '\n')
 note() { tools/measured.py "$1" "${set_to}tools/results.sh $2" "$3"; }
 host() {
   [ -n "${SAPWISE_HOST:-}" ] && return
