@@ -1,7 +1,7 @@
 //! Curves over two logarithmic axes, with the fields of optimal performance behind them: Figures 4, 6 and 7 of the
 //! paper.
 
-use super::{Area, Result, base, chart, colour, grid, mesh, panels, range, svg};
+use super::{Area, Result, chart, colour, grid, log, mesh, panels, range, svg};
 use crate::text::once;
 use plotters::prelude::*;
 
@@ -57,8 +57,7 @@ impl Curves {
     fn panel(&self, panel: &CurvePanel, names: &[String], area: &Area<'_>) -> Result<()> {
         let points = || self.panels.iter().flat_map(|p| &p.curves).flat_map(|c| &c.points);
         let (x, y) = (range(points().map(|p| p.0), 1.1), range(points().map(|p| p.1), 1.2));
-        let mut chart = chart(area, &panel.title)?
-            .build_cartesian_2d(x.clone().log_scale().base(base(&x)), y.clone().log_scale().base(base(&y)))?;
+        let mut chart = chart(area, &panel.title)?.build_cartesian_2d(log(x.clone()), log(y.clone()))?;
         let place = |name: &str| colour(names.iter().position(|n| n == name).unwrap_or_default());
         let rectangle = |f: &Field| {
             let corners = [(f.from.clamp(x.start, x.end), y.start), (f.to.clamp(x.start, x.end), y.end)];

@@ -108,13 +108,14 @@ fn range(values: impl Iterator<Item = f64>, wider: f64) -> std::ops::Range<f64> 
     if low <= high { low / wider..high * wider } else { 0.1..10.0 }
 }
 
-/// The base of the numbers on a logarithmic axis: ten, less over a short one, where powers of ten are few.
-fn base(range: &std::ops::Range<f64>) -> f64 {
-    match range.end / range.start {
+/// A logarithmic axis with numbers at powers of ten, or of less over a short range, where those of ten are few.
+fn log(range: std::ops::Range<f64>) -> LogCoord<f64> {
+    let base = match range.end / range.start {
         ratio if ratio < 5.0 => std::f64::consts::SQRT_2,
         ratio if ratio < 100.0 => 2.0,
         _ => 10.0,
-    }
+    };
+    range.log_scale().base(base).into()
 }
 
 /// A number on an axis: `100 000`, `0.01`.

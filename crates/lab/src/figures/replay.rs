@@ -1,6 +1,6 @@
 //! A replay frame by frame: Figure 8 of the paper.
 
-use super::{HPos, LINE, Result, base, colour, mesh, range, svg, text};
+use super::{HPos, LINE, Result, colour, log, mesh, range, svg, text};
 use plotters::prelude::*;
 
 /// Points of a curve at most; more can't be seen.
@@ -38,12 +38,11 @@ impl Replay {
             let (times, strip) = above.split_vertically(540);
             let frames = 0.0..self.chosen_ns.len().max(1) as f64;
             let us = || self.fixed.iter().map(|f| &f.1).chain([&self.chosen_ns]).flatten().map(|ns| ns / 1e3);
-            let y = range(us(), 1.2);
             let mut chart = ChartBuilder::on(&times)
                 .margin(12)
                 .x_label_area_size(44)
                 .y_label_area_size(70)
-                .build_cartesian_2d(frames.clone(), y.clone().log_scale().base(base(&y)))?;
+                .build_cartesian_2d(frames.clone(), log(range(us(), 1.2)))?;
             mesh(&mut chart, "frame", "time of a frame (µs); black: the adaptive choice")?;
             for (k, (_, ns)) in self.fixed.iter().enumerate() {
                 chart.draw_series(LineSeries::new(thinned(ns), colour(k).stroke_width(2)))?;
