@@ -29,21 +29,16 @@ impl Destination {
     /// # Errors
     /// When the folder takes none, or the path is a folder itself.
     pub(crate) fn new(path: Option<&Path>) -> anyhow::Result<Self> {
-        let Some(path) = path.map(Path::to_path_buf) else {
-            // Nobody named the file that is to be another.
-            check_writable(Path::new(DEFAULT)).context("name a file with --out")?;
-            return Ok(Self::writable(DEFAULT.into()));
-        };
-        check_writable(&path)?;
-        Ok(Self::writable(path))
-    }
-
-    fn writable(path: PathBuf) -> Self {
+        let named = path.is_some();
+        let path = path.unwrap_or(Path::new(DEFAULT)).to_path_buf();
+        let writable = check_writable(&path);
+        // Who named no file has to hear of the option.
+        if named { writable } else { writable.context("name a file with --out") }?;
         let unfinished = match path.extension() {
             Some(extension) if extension == UNFINISHED => path.clone(),
             _ => path.with_added_extension(UNFINISHED),
         };
-        Self { path, unfinished, wrote_unfinished: Cell::new(false) }
+        Ok(Self { path, unfinished, wrote_unfinished: Cell::new(false) })
     }
 
     /// Writes the report as it is now to the unfinished file, so that a power cut costs one scenario.

@@ -63,6 +63,8 @@ fn a_folder_that_takes_no_file_is_told_before_measuring() {
     let file = folder.path().join("file");
     fs::write(&file, "").unwrap();
     failure(sapwise().args(TINY).arg("--out").arg(file.join("report.json")), 1, &["name another"]);
+    fs::create_dir(folder.path().join("report.json")).unwrap();
+    failure(sapwise().current_dir(folder.path()).args(TINY), 1, &["--out", "report.json is a folder"]);
 }
 
 #[cfg(all(target_os = "linux", feature = "long-tests"))]

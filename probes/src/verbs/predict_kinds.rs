@@ -41,10 +41,14 @@ pub(super) fn run(folder: &Path, arguments: &Predict, algorithms: &Algorithms) -
     if reports.is_empty() {
         bail!("{} holds published parameters only; name a folder with measured reports", folder.display());
     }
+    let chosen = choose(&reports, arguments);
+    if chosen.values().any(|(_, best)| best.is_ok()) {
+        outputs::make_folder(out)?;
+    }
     let terminal = Terminal::of_standard_output();
     let mut rows = vec![["tuning", "machine", "from", ""].map(str::to_owned).to_vec()];
     let mut without = 0;
-    for (file, (kind, best)) in choose(&reports, arguments) {
+    for (file, (kind, best)) in chosen {
         interrupt::check()?;
         let machine = format!("{}, {}, {}", kind.cpu, count(kind.cores as usize, "core"), kind.simd);
         let (name, report) = match best {
@@ -56,7 +60,6 @@ pub(super) fn run(folder: &Path, arguments: &Predict, algorithms: &Algorithms) -
             }
         };
         let tuning = prediction::of_report(report, arguments, &model, algorithms).with_context(|| name.clone())?;
-        outputs::make_folder(out)?;
         write_text(&out.join(&file), &json::write_tuning(&tuning)?)?;
         let told = tuning.warnings.first().map_or(terminal.good("good"), |why| terminal.warning(why));
         rows.push(vec![file, machine, name.clone(), told]);
