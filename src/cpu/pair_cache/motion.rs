@@ -119,6 +119,7 @@ struct Keeping {
     /// would.
     grown: f32,
     missed: f32,
+    /// The trial of that half, while it is undecided.
     narrowing: Option<Narrowing>,
     /// How many times the price of a rebuild that has to be, after trials that failed.
     patience: f32,
