@@ -41,13 +41,8 @@ pub(crate) fn sweep(
     }
     // From here on: opening a GPU takes seconds and belongs to no size.
     let end = Instant::now() + Duration::try_from_secs_f64(request.seconds).unwrap_or_default();
-    let own = ScenarioSweep {
-        scenario,
-        seed: request.seed,
-        end,
-        race: Race::new(request.seed, PAIR_LIMIT, request.cores),
-        emit,
-    };
+    let race = Race::new(request.seed, PAIR_LIMIT, request.cores);
+    let own = ScenarioSweep { scenario, registry, seed: request.seed, end, race, emit };
     match &request.schedule {
         Schedule::Ascent(sizes) => own.ascend(racers, sizes, request.seconds),
         Schedule::Visits(visits) => own.visit(racers, visits),
@@ -57,6 +52,7 @@ pub(crate) fn sweep(
 /// The sweep of one scenario.
 struct ScenarioSweep<'a> {
     scenario: Scenario,
+    registry: Registry,
     seed: u64,
     end: Instant,
     race: Race,
@@ -124,6 +120,11 @@ impl ScenarioSweep<'_> {
     /// Runs one size and reports wrong answers.
     fn point(&mut self, racers: &mut [Racer], objects: u32, time: Duration) -> anyhow::Result<Raced> {
         let mut scene = self.scenario.start(objects as usize, self.seed);
+        // It must not remember another scene: after a failed try with ten boxes `pair-cache` kept no pairs at all larger
+        // sizes, and took 2.5 times as long.
+        for racer in racers.iter_mut().filter(|r| r.error.is_none() && r.algorithm.is_incremental()) {
+            racer.algorithm = self.registry.create(&racer.id)?;
+        }
         let mut outcome = self.race.run(racers, &mut scene, time);
         for mismatch in outcome.mismatches.drain(..) {
             (self.emit)(Event::Mismatch(format!("{} at {objects} objects: {mismatch}", self.scenario)))?;
