@@ -371,7 +371,6 @@ def stale_map():
 
 SHOWN = {
     "single best": "one fixed algorithm",
-    "nearest machine": "most similar machine",
     "physics + load": "Sapwise's prediction",
     "physics + load (running)": "in programs, before learning",
 }
@@ -387,7 +386,7 @@ def readme_strategies():
     hosts = next(iter(own.values()))["hosts"]
     return (
         f"Time lost against the best choice, unseen machine (of {hosts}) and scene "
-        "([all strategies](results/heldout.md)):\n\n" + table(["strategy", "all sizes", "around 800 boxes"], body)
+        "([all strategies](results/heldout.md), [what is missing](docs/limitations.md#machines)):\n\n" + table(["strategy", "all sizes", "around 800 boxes"], body)
     )
 
 
@@ -427,10 +426,10 @@ def page_of_heldout():
     return (
         "# Machines held out\n\n"
         "[Regret](../docs/methodology.md#regret-and-what-is-held-out) in percent (least–largest "
-        "[host](regrets.csv)). *In games*: around 800 boxes. "
-        "`six-hosts`: commit 22f9246, older algorithms.\n\n"
-        + table(["model", "strategy", "unseen scenario", "in games", "seen scenario"], body)
-        + "\nMeasured after the model, by profile:\n\n"
+        "[host](regrets.csv)). `six-hosts`: commit 22f9246. "
+        "Three hosts lack [`pair-cache` above SSE2](../docs/limitations.md#machines), which copied machines miss.\n\n"
+        + table(["model", "strategy", "unseen scenario", "~800 boxes", "seen scenario"], body)
+        + "\nMeasured after the model:\n\n"
         + table(["host", "profile", "regret (in games)"], judged)
         + "\n"
         + caption("heldout.csv", None)

@@ -63,27 +63,31 @@ impl Model {
         if self.ranges.is_empty() {
             p.outside([format!("the model {} does not record what it was trained on", self.name)]);
         }
-        let (mut unknown, mut gpus) = (Vec::new(), Vec::new());
+        // Why, and which.
+        let mut left_out: Vec<(String, Vec<String>)> = Vec::new();
+        let mut leave_out = |id: &AlgorithmId, why: String| match left_out.iter_mut().find(|(known, _)| *known == why) {
+            Some((_, ids)) => ids.push(id.to_string()),
+            None => left_out.push((why, vec![id.to_string()])),
+        };
+        let mut gpus = Vec::new();
         let mut works: Works<'_> = Vec::new();
         for Entry { id, revision, .. } in algorithms {
             let backend = id.backend();
             let Some(method) = self.method(id) else {
-                unknown.push(id.to_string());
+                leave_out(id, format!("the model {} was not trained on it", self.name));
                 continue;
             };
             if method.revision != *revision {
-                p.warnings.push(format!(
-                    "{id} is left out: the model knows its revision {}, this build has {revision}; train on new \
-                     reports",
-                    method.revision
-                ));
+                let known = method.revision;
+                let why = format!("the model knows revision {known}, this build has {revision}; train on new reports");
+                leave_out(id, why);
                 continue;
             }
             let work = check_gpus(hardware, backend).and_then(|()| self.work(method, hardware, backend, &mut works));
             let curve = match work.and_then(|work| method.curve(work, hardware, backend)) {
                 Ok(curve) => curve,
                 Err(missing) => {
-                    p.warnings.push(format!("{id} is left out: {missing}"));
+                    leave_out(id, missing.to_string());
                     continue;
                 }
             };
@@ -111,13 +115,7 @@ impl Model {
             p.warnings.push(ASK.to_owned());
         }
         p.warn_of_unmeasured_groups(hardware);
-        if !unknown.is_empty() {
-            p.warnings.push(format!(
-                "left out, since the model {} was not trained on it: {}",
-                self.name,
-                unknown.join(", ")
-            ));
-        }
+        p.warnings.extend(left_out.into_iter().map(|(why, ids)| format!("{}: left out, since {why}", ids.join(", "))));
         if p.costs.is_empty() {
             return Err(PredictError::Nothing { model: p.model, warnings: p.warnings.join("; ") });
         }

@@ -100,13 +100,13 @@ impl Answer<'_> {
         };
         let mut lines = vec![terminal.head(&format!("Adaptive takes {conclusion}")), head];
         lines.extend([format!("{}\n", self.tuning()), self.totals(terminal)]);
+        lines.push(self.comparison(terminal));
         for (k, id) in outcome.fixed.iter().enumerate() {
             let missed = outcome.fixed_times(k).err().map(|missed| count(missed, "frame"));
             lines.extend(
                 missed.map(|m| format!("{id} was not timed in {m}: it failed or was far slower than the best.")),
             );
         }
-        lines.push(self.comparison(terminal));
         lines.push(format!(
             "The oracle runs the best algorithm of every {WINDOW} frames.\n{}",
             match outcome.repeats {
@@ -166,7 +166,7 @@ impl Answer<'_> {
         let head = ["frames", "× single", "× oracle", "median", "p99", "worst", "switches", "explored"];
         let mut rows = vec![head.map(str::to_owned).to_vec(), row("all".to_owned(), &self.whole)];
         rows.extend(self.parts.iter().map(|p| row(format!("{} to {}", p.from_frame, p.to_frame), p)));
-        format!("\n{}", terminal.table(&rows))
+        terminal.table(&rows)
     }
 
     /// The text below the picture: ratios, source of the tuning, and the command that makes it again.

@@ -91,7 +91,7 @@ fn an_implausible_parameter_of_a_gpu_costs_its_algorithms_only() {
     {
         machine.gpus[0].parameters[dispatch].value = value;
         let p = both().predict(&machine, &all).unwrap();
-        assert!(told(&p, "brute@gpu0 is left out") && told(&p, text), "{:?}", p.warnings);
+        assert!(told(&p, "brute@gpu0: left out") && told(&p, text), "{:?}", p.warnings);
         let left: Vec<String> = p.costs.iter().map(|c| c.algorithm.to_string()).collect();
         assert_eq!(left, ["brute@cpu1"]);
     }
