@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Runs the adaptive choice beside every fixed algorithm on this machine and writes results/inline.csv.
 
-    tools/inline.py HOST --report datasets/HOST/full.json --other datasets/amd-epyc-zen3-2c/full.json
+    tools/inline.py HOST --report datasets/HOST/full.json --other datasets/amd-epyc-zen3-2c/portable.json
 
 HOST names the rows; those of other hosts stay. Three tunings take part: the prediction of a model, the one measured
 here (--report), and another machine's (--other), which is judged from frame 300 on. Runs on the CPU only. Nothing else

@@ -9,5 +9,5 @@ out=${1:-pictures}
 mkdir -p "$out"
 cargo build --release --locked -p sapwise-cli
 sapwise=${CARGO_TARGET_DIR:-target}/release/sapwise
-"$sapwise" run fragmentation --objects 20000 --tuning datasets/amd-epyc-zen3-2c/full.json --no-gpus --plot "$out/fragmentation.svg"
+"$sapwise" run fragmentation --objects 20000 --tuning datasets/amd-epyc-zen5-2c/full.json --no-gpus --plot "$out/fragmentation.svg"
 echo "The pictures are in $out."

@@ -36,7 +36,7 @@ inline() {
   local tuning=datasets/traces/$SAPWISE_HOST/predicted.tuning
   [ -e "$tuning" ] || tuning=
   tools/inline.py "$SAPWISE_HOST" --report "datasets/$SAPWISE_HOST/full.json" \
-    --other datasets/amd-epyc-zen3-2c/full.json --repeats 6 ${tuning:+--predicted "$tuning"}
+    --other datasets/amd-epyc-zen3-2c/portable.json --repeats 6 ${tuning:+--predicted "$tuning"}
   note inline.csv inline "n = 6 repeats of 600 to 1200 frames"
 }
 c() { tools/c.sh bench; note c.csv c "medians over all frames"; }

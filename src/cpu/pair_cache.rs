@@ -3,8 +3,8 @@
 //!
 //! While every box stays within its grown box, every overlapping pair is among the pairs of grown boxes. So a frame
 //! costs one test of each box and one of each kept pair. A box that leaves its grown box gets a new one, and a tree of
-//! the grown boxes finds its new neighbours. When that has become expensive, the tree is sorted anew, over some frames.
-//! If, by the clock, all this takes longer than to find all pairs with a tree of the boxes themselves, such a tree
+//! the grown boxes finds its new neighbours. When these queries have become expensive, the tree is sorted anew, over
+//! several frames. If all this takes longer than finding all pairs with a tree of the boxes themselves, such a tree
 //! finds them until the boxes slow down.
 //!
 //! Verlet (Phys. Rev. 159, 1967) kept such lists of neighbours for molecules.
@@ -56,8 +56,8 @@ struct PairCache {
     upkeep: Upkeep,
     /// The share of the boxes of each task.
     shares: Vec<Share>,
-    /// The kept pairs, in a list for each part of the tree. A pair is in the list of the part in which it was found, so
-    /// the boxes of a list are near in space, and in the cache together.
+    /// The kept pairs, in a list for each part of the tree. A pair is in the list of the part in which it was found,
+    /// so the boxes of a list are near in space, and in the cache together.
     kept: Vec<Pairs>,
     last_frame: FrameKind,
 }
@@ -131,7 +131,7 @@ impl BroadPhase for PairCache {
             pairs.clear();
             let Self { workers, tree, upkeep, outputs, .. } = self;
             upkeep.find(&mut tree.tree, workers, (plan, boxes), outputs, pairs)?;
-            // If keeping was tried in vain in this frame, it says nothing.
+            // A frame that first tried to keep pairs is no measure of one from scratch.
             let took =
                 measured_ns(started).filter(|_| margin.is_none()).map(|ns| ns as f32 / boxes.len().max(1) as f32);
             self.motion.found_from_scratch(boxes.len(), pairs.overlapping(), took);
@@ -162,15 +162,15 @@ impl BroadPhase for PairCache {
 }
 
 impl PairCache {
-    /// Notes the number of boxes, until it changes by a factor of two. Then the cost of a box is unknown, and nothing
-    /// is kept.
+    /// Forgets kept pairs and costs when the number of boxes has changed by a factor of two.
     fn fit(&mut self, boxes: usize) {
         if is_as_many(self.fitted_for, boxes) {
             return;
         }
         self.fitted_for = boxes;
         self.grown.forget();
-        // Keeping takes about half as long as finding from scratch. The number may double before it is noted again.
+        // Keeping takes about half the time of finding from scratch. The number may double before the next call that
+        // acts.
         self.motion.resize([boxes / 2, 2 * boxes].map(|boxes| self.position(&self.all.fit(boxes))));
         // Lists for all tasks of any width: another number of threads deals nothing out anew.
         let tasks = self.all.fit(boxes).tasks().min((boxes / SMALLEST_LIST).max(1));
@@ -205,7 +205,8 @@ impl PairCache {
         let parts = kept.len();
         let again = motion.next_to_shrink(boxes.len());
         let changes = grown.check(workers, boxes, margin, again.clone(), pairs.filter(), shares)?;
-        // A renewal takes some frames. If the tree has eight places for three boxes before it ends, all is made again.
+        // Sorting anew takes several frames. If the tree has eight places for three boxes before that ends, it is
+        // rebuilt.
         let rebuilt = changes.new.start == 0
             || motion.wants_rebuild(boxes.len(), &changes)
             || tree.tree.is_sparse(2 * boxes.len());

@@ -20,8 +20,7 @@ use std::path::Path;
 pub(super) fn run(folder: &Path, arguments: &Predict, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
     let Some(out) = arguments.out.as_deref().filter(|_| !arguments.json) else {
         let why = format!(
-            "{} is a folder, which may hold several machines: name a report in it, or a folder for one tuning a \
-             machine with --out, without --json",
+            "{} is a folder: name one report in it, or add `--out FOLDER` (without --json) for one tuning a machine",
             folder.display()
         );
         return Err(WrongUsage(why).into());

@@ -1,4 +1,4 @@
-//! Whether keeping pairs pays, and with which margin.
+//! Decides whether keeping pairs pays, and with which margin.
 
 mod cost;
 #[cfg(test)]
@@ -17,32 +17,31 @@ const MARGINS: [f32; 8] = [0.04, 0.07, 0.1, 0.15, 0.22, 0.33, 0.5, 0.75];
 /// Kept pairs for each box, at most: keeping more would not pay, and takes memory.
 const MOST_KEPT: f32 = 32.0;
 
-/// No more pairs are kept than this many times what the margin promised and one for each box. A margin that was too
-/// large then costs as much as a few frames from scratch, where it would cost as much as twenty.
+/// Upper bound on kept pairs per box, over one plus what the margin promised. It limits the cost of a margin that is
+/// too large to a few frames from scratch; without it, to twenty.
 const KEPT_OVER_PROMISED: f32 = 4.0;
 
-/// Pairs that a box is taken to have at the least when a margin is chosen. Where none overlap yet, boxes may be
-/// stacked a hair apart, and any margin would seem free.
+/// Pairs per box assumed at least when a margin is chosen. Boxes without pairs may be stacked a hair apart: any margin
+/// would seem free.
 const FEWEST_PAIRS: f32 = 0.5;
 
-/// Frames over which the shares that decide the margin are averaged, and by how much it changes in a frame. After all
-/// boxes got new grown boxes none leaves for some frames: a margin that followed at once would swing.
+/// Frames over which the shares that decide the margin are averaged, and the factor by which it changes in a frame. No
+/// box leaves in the first frames after a rebuild: a margin that followed at once would swing.
 const LEARNING: f32 = 64.0;
 const MARGIN_STEP: f32 = 1.005;
 
-/// Of the boxes so many leave at once where the scene jumped, or where this method has not seen its last frames.
+/// Share of the boxes that leave at once when the scene jumped or this method missed frames.
 const JUMP: f32 = 0.5;
 
-/// Boxes that leave a sorted tree, as a share of all and at least, from which it is learned how many nodes a query
-/// looks at.
+/// Departures from a sorted tree that teach how many nodes a query visits: as a share of all boxes, and at least.
 const FRESH: f32 = 0.02;
 const FEWEST_FRESH: u64 = 64;
 
-/// Where the boxes that leave cost less than this share of what the kept pairs do, they shake in place or have come to
-/// rest. Then no rate of leaving says how many would leave a smaller grown box, and half the margin is tried.
+/// If departures cost less than this share of the kept pairs, boxes shake in place or rest. Then the rate of
+/// departures does not show how many would leave a smaller grown box, and half the margin is tried.
 const RARE: f32 = 0.5;
 
-/// Frames over which grown boxes that are too wide are made smaller.
+/// Frames over which grown boxes that are too wide shrink.
 const SHRINKING: usize = 64;
 
 /// Half the margin is given up once it has cost more than this share of a rebuild, and the next trial waits this many
@@ -50,17 +49,17 @@ const SHRINKING: usize = 64;
 const LOST_BY_TRIAL: f32 = 0.1;
 const PATIENCE: f32 = 4.0;
 
-/// Frames for which the promised cost counts in the mean cost of a frame.
+/// Weight of the promised cost in the mean cost of a frame, in frames.
 const PROMISED: f32 = 16.0;
 
-/// Frames after which keeping has paid: when it ceases to, that is because the scene changed.
+/// Frames after which keeping has proven itself: if it fails later, the scene has changed.
 const PROVEN: u32 = 256;
 
-/// Frames from scratch between two looks at whether keeping would pay, at most. A look at 100 boxes takes a tenth of a
-/// frame.
+/// Most frames from scratch between two estimates of whether keeping would pay. An estimate for 100 boxes takes a
+/// tenth of a frame.
 const MOST_PAUSE: u32 = 7;
 
-/// Nodes of a tree that are looked at for a box, before any was counted.
+/// Nodes assumed per query before any was counted.
 const NODES: f32 = 12.0;
 
 /// What a frame in which pairs were kept has done.
@@ -68,9 +67,9 @@ const NODES: f32 = 12.0;
 pub(super) struct Work {
     /// Kept pairs that were tested.
     pub(super) kept_pairs: usize,
-    /// Boxes that counted as having left, to get a smaller grown box.
+    /// Boxes that were given a smaller grown box, which count as having left.
     pub(super) grown_again: usize,
-    /// Nodes of the tree that were looked at for boxes that left.
+    /// Nodes visited by the queries of boxes that left.
     pub(super) nodes: u64,
     /// Whether tree and pairs were made again.
     pub(super) rebuilt: bool,
@@ -84,13 +83,12 @@ pub(super) struct Motion {
     /// Pairs for each box in the last frame; `None` before the first.
     density: Option<f32>,
     keeping: Option<Keeping>,
-    /// Frames until the next look at whether keeping would pay, and after it if it would not.
+    /// Frames until the next estimate of whether keeping would pay, and from that one to the one after it.
     pause: u32,
     next_pause: u32,
-    /// How far they move in this frame, where that was told.
+    /// Speed in this frame, if the plan has it.
     told: Option<f32>,
-    /// No larger margin is begun with: that one kept too many pairs, of boxes near one another that do not overlap
-    /// yet.
+    /// Largest margin to begin with: larger ones kept too many pairs of near boxes that do not overlap.
     most_margin: f32,
     pub(super) prices: Prices,
 }
@@ -99,33 +97,32 @@ pub(super) struct Motion {
 #[derive(Debug, Clone, Copy)]
 struct Keeping {
     margin: Margin,
-    /// How far boxes moved in a frame when that was told last, in edges.
+    /// Last known speed, in edges a frame.
     pace: f32,
-    /// Cost for each box, averaged over the last frames.
+    /// Cost per box, averaged over the last frames.
     cost: f32,
-    /// What of that the kept pairs took in the last frame.
+    /// Part of the last frame's cost per box that tested kept pairs.
     tests: f32,
-    /// Share of the boxes that leave in a frame without a jump and kept pairs for each box, averaged over the last
+    /// Share of the boxes that leave in a frame without a jump, and kept pairs per box, both averaged over
     /// [`LEARNING`] frames.
     leaving: f32,
     kept: f32,
-    /// Nodes looked at for each box that left, averaged in the same way.
+    /// Nodes visited per box that left, averaged in the same way.
     nodes: f32,
-    /// Of the tree. A new order is worth it when the excess has cost as much as that does (the ski-rental bound).
+    /// Wear of the tree. Sorting pays once the wear has cost as much as sorting (the ski-rental bound).
     wear: Wear,
-    /// The first box that still has a grown box that is too wide.
+    /// The first box whose grown box is still too wide.
     wide_from: Option<usize>,
-    /// The margin that the grown boxes have in the mean, and what half of it would have saved for each box since it
-    /// would.
+    /// Mean margin of the grown boxes, and what half of it would have saved per box by now.
     grown: f32,
     missed: f32,
     /// The trial of that half, while it is undecided.
     narrowing: Option<Narrowing>,
-    /// How many times the price of a rebuild that has to be, after trials that failed.
+    /// Rebuilds that this saving must exceed before half the margin is tried. Grows with each failed trial.
     patience: f32,
     /// Frames since keeping began.
     frames: u32,
-    /// Cost for each box in the last frame, and in the mean frame, rebuilds included.
+    /// Cost per box in the last frame, and in the mean frame with rebuilds.
     work: f32,
     mean_work: f32,
 }
@@ -133,16 +130,16 @@ struct Keeping {
 /// A trial of half the margin.
 #[derive(Debug, Clone, Copy)]
 struct Narrowing {
-    /// The margin before, the share that left, and the cost for each box.
+    /// Margin, share of departures and cost per box before the trial.
     margin: f32,
     leaving: f32,
     cost: f32,
-    /// What the trial has cost for each box beyond that.
+    /// Cost of the trial per box beyond that.
     lost: f32,
 }
 
 impl Keeping {
-    /// Returns what the wear of the tree has cost for each box.
+    /// Returns what the wear of the tree has cost per box.
     fn excess(&self, objects: usize) -> f32 {
         cost::nodes(cost::far(objects), self.wear.excess as f32) / objects.max(1) as f32
     }
@@ -152,13 +149,13 @@ impl Keeping {
         (0.5 * self.grown).max(MARGINS[0])
     }
 
-    /// Pairs that are kept with that over those that are kept now.
+    /// Kept pairs with that margin over those with the present one.
     fn narrower_keeps(&self) -> f32 {
         ((1.0 + 2.0 * self.narrower()) / (1.0 + 2.0 * self.grown)).powi(3).min(1.0)
     }
 
-    /// What it would have saved for each box in a frame with so many kept pairs each, in which that share of the boxes
-    /// left. As many more would have left as of boxes that wander.
+    /// Estimated saving per box with half the margin, in a frame with `kept` pairs per box in which the share `left`
+    /// left. Assumes a random walk: departures scale with margin⁻².
     fn narrower_saves(&self, far: f32, kept: f32, left: f32) -> f32 {
         let more = (left * (self.grown / self.narrower()).powi(2)).min(1.0) - left;
         cost::tests(far, kept)
@@ -166,14 +163,14 @@ impl Keeping {
             - cost::left(far, self.nodes) * more.max(0.0)
     }
 
-    /// Whether it would have saved by now what it costs to grow all boxes again. Boxes that come to rest never leave
-    /// by themselves: without this their wide grown boxes would stay for ever, and with them five times the pairs.
+    /// Whether half the margin would have paid for growing all boxes again by now. Boxes at rest never leave by
+    /// themselves: without this check their wide grown boxes would stay for ever, with five times the pairs.
     fn is_too_wide(&self, objects: usize) -> bool {
         self.missed > self.patience * cost::rebuild(cost::far(objects), self.kept * self.narrower_keeps())
     }
 
-    /// Learns from a frame that cost this much for each box, without the boxes that were grown again, whether half the
-    /// margin is the better one. Boxes that shake in place stay within a margin for ever and leave half of it in every
+    /// Learns from a frame of a trial whether half the margin is cheaper. `cost`: per box, without the boxes that were
+    /// given a smaller grown box. Boxes that shake in place never leave the whole margin but leave half of it every
     /// few frames.
     fn judge_narrowing(&mut self, cost: f32, rebuild: f32) {
         let Some(trial) = &mut self.narrowing else { return };
@@ -189,7 +186,7 @@ impl Keeping {
 }
 
 impl Motion {
-    /// `timed`: measured times decide, and not the cost model alone.
+    /// `timed`: measured times decide, not the cost model alone.
     pub(super) fn new(timed: bool) -> Self {
         Self {
             displacement: Displacement::default(),
@@ -203,7 +200,7 @@ impl Motion {
         }
     }
 
-    /// Returns the margin for boxes that get a new grown box in this frame; `None` if no pairs are to be kept.
+    /// Returns the margin of new grown boxes in this frame; `None` if no pairs are kept.
     pub(super) fn advise(&mut self, plan: &FramePlan, boxes: &[Aabb]) -> Option<Margin> {
         self.told = plan.moved().map(|moved| moved as f32);
         if self.keeping.is_none() {
@@ -212,7 +209,7 @@ impl Motion {
         self.keeping.map(|k| k.margin)
     }
 
-    /// Begins to keep pairs if that promises to pay. Looks ever more rarely if it promises nothing.
+    /// Begins to keep pairs if the estimate promises a gain. Estimates become rarer as long as it does not.
     fn look(&mut self, plan: &FramePlan, boxes: &[Aabb]) {
         if self.pause > 0 {
             self.pause -= 1;
@@ -231,86 +228,85 @@ impl Motion {
         }
     }
 
-    /// Takes note of the pairs of a frame.
+    /// Notes the number of pairs of a frame.
     pub(super) fn found(&mut self, objects: usize, pairs: u64) {
         self.density = Some(pairs as f32 / objects.max(1) as f32);
     }
 
-    /// The cost of a box from scratch, by the model.
+    /// Returns the model's cost of a box from scratch.
     fn scratch(&self, objects: usize) -> f32 {
         cost::scratch(cost::far(objects), self.density.unwrap_or_default())
     }
 
-    /// Learns from a frame from scratch with this many pairs, which took `took` nanoseconds for each box, if the clock
-    /// could tell.
+    /// Learns from a frame from scratch. `took`: nanoseconds per box, if the clock is fine enough.
     pub(super) fn found_from_scratch(&mut self, objects: usize, pairs: u64, took: Option<f32>) {
         self.found(objects, pairs);
         self.prices.add_scratch(took, self.scratch(objects));
     }
 
-    /// Keeping failed, because there were too many pairs to keep or because it did not pay.
+    /// Stops keeping, because it did not pay or there were `too_many` pairs.
     pub(super) fn stop(&mut self, too_many: bool) {
         let Some(failed) = self.keeping.take() else { return };
         if too_many || failed.tests > 0.5 * failed.cost {
             self.most_margin = (0.5 * failed.margin.share).max(MARGINS[0]);
         }
         self.prices.failed(too_many);
-        // The frame after the next one compares its boxes with those of the next one.
+        // Motion is known one frame after the next one.
         self.pause = 1;
     }
 
     /// Other algorithms ran this many frames since the last one of this.
     pub(super) fn missed(&mut self, frames: u64) {
-        // Of boxes before all of these.
+        // It holds boxes from before these frames.
         self.displacement = Displacement::default();
         (self.pause, self.next_pause) = (0, 0);
         self.prices.fade(frames);
         self.prices.searchers.resume();
     }
 
-    /// The number of boxes has changed by a factor of two or more: what a box costs is to be learned again. `widths`:
-    /// on how many threads pairs are kept and found from scratch at first.
+    /// Forgets the costs of a box, because the number of boxes has changed by a factor of two or more. `widths`:
+    /// initial positions of the thread counts with kept pairs and from scratch.
     pub(super) fn resize(&mut self, widths: [usize; 2]) {
         self.interrupt();
         self.prices.forget(widths);
     }
 
-    /// A frame failed for no fault of keeping.
+    /// Forgets the kept pairs after a frame that failed for another reason.
     pub(super) fn interrupt(&mut self) {
         self.keeping = None;
     }
 
-    /// How many pairs this many boxes may keep. More are not what the margin promised.
+    /// Returns the upper bound on kept pairs of this many boxes.
     pub(super) fn most_kept(&self, objects: usize) -> usize {
         let promised = self.keeping.map_or(MOST_KEPT, |k| k.kept);
         let each = (KEPT_OVER_PROMISED * (promised + 1.0)).min(MOST_KEPT);
         (each * objects as f32) as usize + 1024
     }
 
-    /// Work of the last frame in which pairs were kept, over that of the mean one.
+    /// Returns the work of the last frame with kept pairs over the mean.
     pub(super) fn work_over_mean(&self) -> f32 {
         self.keeping.map_or(1.0, |k| k.work / k.mean_work)
     }
 
-    /// Whether tree and pairs are made again in this frame, in which boxes left as `changes` says.
+    /// Whether this frame, in which boxes left as `changes` says, rebuilds the tree and the pairs.
     pub(super) fn wants_rebuild(&self, objects: usize, changes: &Changes) -> bool {
         let Some(keeping) = self.keeping else { return false };
         changes.left as f32 > JUMP * objects as f32
             || keeping.excess(objects) > cost::rebuild(cost::far(objects), keeping.kept)
     }
 
-    /// Whether the boxes in the tree are to be sorted anew, over some frames.
+    /// Whether to sort the boxes of the tree anew, over several frames.
     pub(super) fn wants_renewal(&self, objects: usize) -> bool {
         self.keeping.is_some_and(|k| k.excess(objects) > cost::renewal(cost::far(objects)))
     }
 
-    /// The boxes in the tree stand in a new order.
+    /// Notes that the tree is sorted.
     pub(super) fn renewed(&mut self) {
         self.keeping.iter_mut().for_each(|k| k.wear = Wear::default());
     }
 
-    /// Returns the boxes whose grown boxes are made smaller in this frame. When the margin is too wide they all are, a
-    /// few in each frame.
+    /// Returns the boxes whose grown boxes shrink in this frame. If the margin is too wide, all do within
+    /// [`SHRINKING`] frames.
     pub(super) fn next_to_shrink(&mut self, objects: usize) -> Range<usize> {
         let Some(keeping) = self.keeping.as_mut().filter(|k| k.wide_from.is_some() || k.is_too_wide(objects)) else {
             return 0..0;
@@ -326,12 +322,12 @@ impl Motion {
         first.min(end)..end
     }
 
-    /// The margin with which all boxes are grown again in a frame in which boxes left as `changes` says: the scene may
-    /// have changed its sizes since the last time.
+    /// Returns the margin of a rebuild, in a frame in which boxes left as `changes` says. Box sizes may have changed
+    /// since the previous one.
     pub(super) fn renew(&mut self, plan: &FramePlan, boxes: &[Aabb], changes: &Changes) -> Margin {
         let jumped = changes.left as f32 > JUMP * boxes.len() as f32;
-        // At the same pace the margin stays, for it was found in many frames: boxes that are only taken from a pool
-        // and put back move as before.
+        // At the same speed the margin stays, since it took many frames to find: boxes that return from a pool move as
+        // before.
         let another = |keeping: Keeping| plan.moved().is_some_and(|now| !is_same_pace(keeping.pace.into(), now));
         if jumped && self.keeping.is_some_and(another) {
             self.keeping = self.begin(plan, boxes).or(self.keeping);
@@ -343,9 +339,8 @@ impl Motion {
         })
     }
 
-    /// Learns from a frame in which boxes left as `changes` says and which took `took` nanoseconds for each box, if the
-    /// clock could tell.
-    /// `false` when keeping does not pay any more.
+    /// Learns from a frame with kept pairs. `took`: nanoseconds per box, if the clock is fine enough. Returns whether
+    /// keeping still pays.
     pub(super) fn learn(&mut self, objects: usize, changes: &Changes, did: &Work, took: Option<f32>) -> bool {
         let far = cost::far(objects);
         let scratch = self.scratch(objects);
@@ -362,7 +357,7 @@ impl Motion {
         k.work = now;
         k.mean_work += (now - k.mean_work) / (PROMISED + k.frames as f32).min(LEARNING);
         k.kept += (kept - k.kept) / LEARNING;
-        // Boxes that move alike leave together, in frames in which all is made again.
+        // Boxes that move alike leave together, in frames that rebuild.
         k.leaving += if k.frames > 0 { (outgrown - k.leaving) / LEARNING } else { 0.0 };
         if rebuilt {
             (k.grown, k.missed, k.wide_from, k.narrowing) = (k.margin.share, 0.0, None, None);
@@ -375,8 +370,8 @@ impl Motion {
             let by_themselves = share(changes.left.saturating_sub(did.grown_again));
             k.judge_narrowing(k.tests + leaving(by_themselves), cost::rebuild(far, k.kept));
         }
-        // At the best margin the two costs grow at the same rate: kept pairs as (1 + 2 m)^3, boxes that leave as m^-p
-        // with p between 1, for those that fly straight on, and 2, for those that wander.
+        // At the best margin m both costs change at the same rate: kept pairs as (1 + 2 m)^3, departures as m^-p, with
+        // p from 1 (straight flight) to 2 (random walk).
         let m = k.margin.share;
         let (keep, leave) = (
             (cost::tests(far, k.kept) - cost::BOX) * 6.0 * m / (1.0 + 2.0 * m),
@@ -395,17 +390,16 @@ impl Motion {
         self.prices.pays(took, now, scratch)
     }
 
-    /// How far the boxes moved since the frame before, and how many pairs for each there are; `None` where nobody
-    /// knows.
+    /// Returns the motion since the previous frame and the pairs per box; `None` if either is unknown.
     fn known(&self, plan: &FramePlan, boxes: &[Aabb]) -> Option<(f32, f32)> {
         // The motion in the plan may be some frames old.
         let moved = self.displacement.motion(boxes).map(|m| m.moved).or(plan.moved())?;
-        // What this method has found itself may be of long ago.
+        // The density that this method found itself may be old.
         let density = plan.pairs().map(|pairs| pairs as f32 / boxes.len().max(1) as f32).or(self.density)?;
         Some((moved as f32, density))
     }
 
-    /// Returns how to keep pairs if that promises to pay.
+    /// Returns how to keep pairs, if the estimate promises a gain.
     fn begin(&mut self, plan: &FramePlan, boxes: &[Aabb]) -> Option<Keeping> {
         let (motion, density) = self.known(plan, boxes)?;
         self.density = Some(density);
@@ -441,7 +435,7 @@ impl Motion {
     }
 }
 
-/// Mean edges count as no longer than four times that which nine boxes in ten don't exceed.
+/// Returns the cap on mean edges: four times the 0.9 quantile.
 fn longest_edge(plan: &FramePlan, boxes: &[Aabb]) -> f32 {
     4.0 * (plan.stats(boxes).extent.iter().sum::<f64>() / 3.0) as f32
 }

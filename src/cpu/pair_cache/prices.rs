@@ -1,63 +1,63 @@
-//! What frames cost by the clock: with kept pairs, and from scratch.
+//! Measured costs of frames with kept pairs and of frames from scratch.
 
 use super::width::Width;
 use crate::cpu::mean_time::MeanTime;
 use crate::load::is_same_pace;
 
-/// Frames from scratch before pairs are kept, and the first of them that counts: one builds the tree, the next may
-/// refit it. The least of those that count is taken: an interrupted one would make keeping look cheap for good.
+/// Frames from scratch before pairs are kept, and the first of them that counts: the first builds the tree, the second
+/// may refit it. The fastest that counts is taken: an interrupted one would make keeping look cheap for good.
 const FEWEST_FRAMES: u32 = 6;
 const FIRST_COUNTED: u32 = 3;
 
-/// Keeping stops when it has cost this many frames from scratch more than finding as many from scratch.
+/// Keeping stops once it has lost the time of this many frames from scratch.
 const MOST_LOST: f32 = 4.0;
 
-/// The frame that begins to keep pairs counts as at most this many from scratch: it alone pays for memory.
+/// Most frames from scratch that the first frame with kept pairs counts as: it also pays for memory.
 const MOST_OF_FIRST: f32 = 3.0;
 
-/// A frame counts as at most this many times what its work is expected to take: longer ones were interrupted.
+/// Most multiples of its expected time that a frame counts as: longer ones were interrupted.
 const MOST_RISE: f32 = 2.0;
 
-/// After a failure, keeping must promise to cost this many times less than finding from scratch.
+/// After a failure, keeping must promise to be this many times as fast as finding from scratch.
 const WARY: f32 = 1.1;
 
-/// If too many pairs had to be kept, that counts as this many times the cost of finding them from scratch.
+/// Cost of a try with too many pairs, in frames from scratch.
 const CROWDED: f32 = 2.0;
 
-/// Frames without kept pairs over which what a failure has shown falls to an e-th.
+/// Frames without kept pairs over which the memory of a failure falls to an e-th.
 const FORGETTING: f32 = 512.0;
 
-/// Measured costs of a box in nanoseconds, over what the cost model says of the frame. The model's constants are those
-/// of another machine, but it knows how costs change with the scene.
+/// Measured costs of a box in nanoseconds over the cost model's. The constants of the model are those of another
+/// machine, but it shows how costs change with the scene.
 #[derive(Debug, Clone)]
 pub(super) struct Prices {
-    /// Without a clock, and if it is too coarse, a frame takes what the model says.
+    /// False without a fine clock: a frame then takes what the model says.
     timed: bool,
-    /// Number of frames from scratch, and cost of the mean one.
+    /// Number of frames from scratch, and their mean cost.
     frames: u32,
     of_scratch: MeanTime,
-    /// Cost of the mean frame with kept pairs, over that; whether it was measured beside that, for as many boxes.
+    /// Mean cost with kept pairs over that, and whether both were measured with the same number of boxes.
     keeping: MeanTime,
     is_beside: bool,
-    /// On how many threads pairs are kept, and found from scratch.
+    /// Threads with kept pairs, and from scratch.
     pub(super) keepers: Width,
     pub(super) searchers: Width,
-    /// Cost of keeping beyond that of frames from scratch, in such frames, since it was last below.
+    /// Time lost against frames from scratch, in such frames, since keeping was last ahead.
     lost: f32,
-    /// What the model said of keeping and of finding from scratch when keeping began.
+    /// The model's costs with kept pairs and from scratch when keeping began.
     promised: [f32; 2],
-    /// Sum and number of what the model said of the work in the frames since, without the first, which builds.
+    /// Sum and number of the model's costs in the frames since, without the first, which builds.
     kept: [f32; 2],
     failure: Failure,
 }
 
-/// What the last failure showed of the promises.
+/// The last failure.
 #[derive(Debug, Clone, Copy)]
 struct Failure {
     /// The work of keeping over the promised one.
     over: f32,
-    /// How far boxes moved in a frame after it, in edges, once that is known; infinite if other algorithms ran then.
-    /// Slower boxes are kept more cheaply.
+    /// Speed of the boxes after it, in edges a frame, once known; infinite if other algorithms ran then. Keeping
+    /// slower boxes is cheaper.
     pace: Option<f32>,
 }
 
@@ -78,10 +78,10 @@ impl Prices {
         }
     }
 
-    /// Forgets what a box costs, and half of how keeping and finding from scratch compare: with a tenth of the boxes
-    /// keeping may take twice as long for each, beside finding from scratch. In `uniform` that swings between 50 and
-    /// 3000 boxes, frames take 0.74 to 0.82 times as long as if all of it is remembered. `widths`: on how many threads
-    /// pairs are kept and found from scratch at first.
+    /// Forgets the costs of a box, and half the logarithm of their ratio: with a tenth of the boxes, keeping may take
+    /// twice as long beside finding from scratch. In `uniform` that swings between 50 and 3000 boxes, frames take 0.74
+    /// to 0.82 × the time with the whole ratio remembered. `widths`: initial positions of the thread counts with kept
+    /// pairs and from scratch.
     pub(super) fn forget(&mut self, widths: [usize; 2]) {
         (self.frames, self.of_scratch, self.is_beside) = (0, MeanTime::default(), false);
         self.keepers.restart(widths[0]);
@@ -89,7 +89,7 @@ impl Prices {
         self.change_keeping(f64::sqrt);
     }
 
-    /// Learns from a frame from scratch, of which the model says `model`.
+    /// Learns from a frame from scratch that costs `model` by the model.
     pub(super) fn add_scratch(&mut self, took: Option<f32>, model: f32) {
         self.frames = self.frames.saturating_add(1);
         let counts = self.frames >= FIRST_COUNTED;
@@ -104,7 +104,7 @@ impl Prices {
             return;
         }
         self.of_scratch.add(cost);
-        // A frame with kept pairs takes as long as before: the first frames after a build told too little.
+        // The first frames after a build looked too cheap; that changes nothing about frames with kept pairs.
         if self.is_beside {
             let over = before / self.of_scratch.0.unwrap_or(cost);
             self.change_keeping(|keeping| keeping * over);
@@ -115,13 +115,13 @@ impl Prices {
         self.keeping.0 = self.keeping.0.map(change);
     }
 
-    /// Cost of a frame with kept pairs over that from scratch, as far as that is known.
+    /// Returns the measured cost with kept pairs over that from scratch; 1 if unknown.
     fn measured(&self) -> f64 {
         self.keeping.0.unwrap_or(1.0)
     }
 
-    /// Returns whether a try of keeping boxes of this pace is worth it by what the model says. The clock ends a try
-    /// that does not pay, which counts, less and less, for the next ones.
+    /// Returns whether keeping boxes of this speed is worth a try, by the model's costs. The clock ends a try that
+    /// does not pay; the memory of it fades.
     pub(super) fn promise(&mut self, pace: f32, keeping: f32, scratch: f32) -> bool {
         let failed_at = f64::from(*self.failure.pace.get_or_insert(pace));
         let is_slower = f64::from(pace) < failed_at && !is_same_pace(pace.into(), failed_at);
@@ -130,14 +130,14 @@ impl Prices {
         over * measured * keeping < scratch && (!self.timed || self.frames >= FEWEST_FRAMES)
     }
 
-    /// Begins a try that promised this.
+    /// Begins a try with these costs by the model.
     pub(super) fn begin(&mut self, keeping: f32, scratch: f32) {
         // The frame that builds is not counted.
         (self.lost, self.promised, self.kept) = (0.0, [keeping, scratch], [0.0, -1.0]);
         self.keepers.resume();
     }
 
-    /// Frames go by in which no pairs are kept.
+    /// Lets the memory of the last failure fade over frames without kept pairs.
     pub(super) fn fade(&mut self, frames: u64) {
         let kept = (-(frames as f64) / f64::from(FORGETTING)).exp();
         let faded = |over: f64| 1.0 + (over - 1.0) * kept;
@@ -146,7 +146,7 @@ impl Prices {
         self.change_keeping(faded);
     }
 
-    /// Ends a try that did not pay, or that had too many pairs to keep, at any pace.
+    /// Ends a try that did not pay, or had too many pairs to keep at any speed.
     pub(super) fn failed(&mut self, too_many: bool) {
         let (work, pace) = match self.kept {
             _ if too_many => (CROWDED * self.promised[1], Some(0.0)),
@@ -155,13 +155,13 @@ impl Prices {
         };
         self.searchers.resume();
         if too_many {
-            // One list may hold more of them if there are fewer.
+            // Fewer lists may hold more pairs each.
             self.keepers = Width::new(0);
         }
         self.failure = Failure { over: (WARY * work / self.promised[0]).max(WARY), pace };
     }
 
-    /// Learns from a frame with kept pairs. `work`, `scratch`: what the model says of it, and of one from scratch.
+    /// Learns from a frame with kept pairs. `work`, `scratch`: its cost by the model, and that of one from scratch.
     /// Returns whether to go on.
     pub(super) fn pays(&mut self, took: Option<f32>, work: f32, scratch: f32) -> bool {
         let took = took.filter(|_| self.timed);
@@ -200,8 +200,8 @@ mod tests {
         begins
     }
 
-    /// After frames from scratch that took 50 ns a box, of which the model says 40, and the beginning of a try that
-    /// promises to take 30 instead. Boxes move by a tenth of an edge.
+    /// Returns prices after frames from scratch that took 50 ns a box (40 by the model) and the beginning of a try
+    /// that promises 30. Boxes move by a tenth of an edge.
     fn keeping() -> Prices {
         let mut prices = Prices::new(true);
         (0..10).for_each(|_| prices.add_scratch(Some(50.0), 40.0));
@@ -244,7 +244,7 @@ mod tests {
         assert!(frames(1000, 4000.0) < 10 && frames(20, 1000.0) < 100);
     }
 
-    /// The first promise, of those that fall by one, for which keeping would begin.
+    /// Returns the largest integer promise for which keeping would begin.
     fn begins_at(prices: &Prices, pace: f32) -> i32 {
         (0..40).rev().find(|&keeping| begins(&mut prices.clone(), pace, keeping as f32, 40.0)).unwrap()
     }

@@ -1,35 +1,35 @@
-//! On how many threads a frame is fastest, by the clock.
+//! Finds the fastest number of threads by the clock.
 //!
 //! A frame with kept pairs may take less time than a second thread takes to wake. On one machine of `datasets/` two
-//! threads took 0.7 times as long as one for 4000 boxes, on another 1.3 to 2.1 times for 3000. So a few frames are
-//! tried on half or twice as many threads, and what takes less time stays.
+//! threads took 0.7 × the time of one for 4000 boxes, on another 1.3 to 2.1 × for 3000. So a few frames run on half or
+//! twice the threads, and the faster number stays.
 
-/// Frames that are compared, by their median: a rebuild or an interruption among them says nothing. A trial ends as
-/// soon as three of its frames say the same. A first one that wakes threads does not count.
+/// Frames that a trial compares, by their median: one rebuild or interruption does not decide. A trial ends as soon as
+/// three of its frames agree. A first frame that wakes threads does not count.
 const RECENT: usize = 5;
 /// Share of the time that trials may cost.
 const BUDGET: f64 = 0.005;
 /// Frames before the first trial, and between two of them, at least.
 const FIRST: u32 = 8;
 const APART: u32 = 64;
-/// What is tried stays if it takes less than this share of the time.
+/// The tried number stays if it takes less than this share of the time.
 const WINS: f64 = 0.97;
-/// A trial ends early once the frames that count have lost the time of this many usual frames. One frame loses at most
-/// the second number: a breakpoint says nothing of later frames.
+/// A trial ends early once its counted frames have lost the time of this many usual frames. One frame counts as at
+/// most the second number: a stop in a debugger does not predict later frames.
 const MOST_LOST: f64 = 4.0;
 const MOST: f64 = 64.0;
 
-/// The number of threads, as a position in the ascending list of those that can be had.
+/// The number of threads, as a position in the ascending list of available numbers.
 #[derive(Debug, Clone)]
 pub(super) struct Width {
-    /// The position if the frame has work for as many threads, and the highest one for which it has.
+    /// The chosen position, and the highest one that the frame has work for.
     now: usize,
     most: usize,
-    /// Costs of the last usual frames over what the cost model says of them, and their number.
+    /// Measured costs of the last usual frames over the model's, and their number.
     costs: [f64; RECENT],
     frames: usize,
     trial: Option<Trial>,
-    /// Frames until the next trial, and whether that is of more threads.
+    /// Frames until the next trial, and whether it is of more threads.
     pause: u32,
     wider: bool,
 }
@@ -39,16 +39,16 @@ struct Trial {
     at: usize,
     /// Whether the next frame wakes threads.
     wakes: bool,
-    /// Frames that took less time than the usual ones, and that did not.
+    /// Frames that were faster than the usual ones, and those that were not.
     won: usize,
     lost: usize,
-    /// What all frames lost, and those that count, in usual frames.
+    /// Time lost by all frames, and by those that count, in usual frames.
     cost: f64,
     counted: f64,
 }
 
 impl Width {
-    /// Begins with this position.
+    /// Begins at this position.
     pub(super) fn new(now: usize) -> Self {
         Self { now, most: usize::MAX, costs: [0.0; RECENT], frames: 0, trial: None, pause: FIRST, wider: now == 0 }
     }
@@ -69,7 +69,7 @@ impl Width {
         self.trial.as_ref().map_or(now, |trial| trial.at)
     }
 
-    /// Begins anew for another number of boxes. How long a trial has to wait is half forgotten.
+    /// Begins anew for another number of boxes, and halves the wait for the next trial.
     pub(super) fn restart(&mut self, now: usize) {
         *self = Self { pause: FIRST.max(self.pause / 2), ..Self::new(now) };
     }
@@ -79,7 +79,7 @@ impl Width {
         (self.trial, self.pause) = (None, self.pause.max(FIRST));
     }
 
-    /// Takes in the cost of a frame over what the cost model says of it. Returns whether it was a usual one.
+    /// Learns from a frame with this measured cost over the model's. Returns whether it was a usual one.
     pub(super) fn ran(&mut self, cost: f32) -> bool {
         let Some(trial) = &mut self.trial else {
             self.costs[self.frames % RECENT] = cost.into();
@@ -117,7 +117,7 @@ fn middle(costs: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// Returns the position and the share of frames on others, after frames that cost this much on each.
+    /// Returns the position, and the share of frames at others, after frames with these costs at each.
     fn after(frames: u32, costs: &[f32], from: usize) -> (usize, f32) {
         let mut width = Width::new(from);
         let mut others = 0;
