@@ -13,6 +13,14 @@ use std::ops::Range;
 
 /// Margins that are compared, as shares of a mean edge.
 const MARGINS: [f32; 8] = [0.04, 0.07, 0.1, 0.15, 0.22, 0.33, 0.5, 0.75];
+const WIDEST: f32 = MARGINS[MARGINS.len() - 1];
+
+/// If testing kept pairs costs this many times what the margin promised when a try fails, the margin was too large.
+const OVER_PROMISED: f32 = 1.5;
+
+/// Frames without kept pairs over which the largest margin to begin with grows by a factor of e. The next try comes
+/// sooner, with the smaller margin.
+const RELAXING: f32 = 4096.0;
 
 /// Kept pairs for each box, at most: keeping more would not pay, and takes memory.
 const MOST_KEPT: f32 = 32.0;
@@ -101,8 +109,9 @@ struct Keeping {
     pace: f32,
     /// Cost per box, averaged over the last frames.
     cost: f32,
-    /// Part of the last frame's cost per box that tested kept pairs.
+    /// Part of the last frame's cost per box that tested kept pairs, and what the margin promised at first.
     tests: f32,
+    promised_tests: f32,
     /// Share of the boxes that leave in a frame without a jump, and kept pairs per box, both averaged over
     /// [`LEARNING`] frames.
     leaving: f32,
@@ -195,7 +204,7 @@ impl Motion {
             pause: 0,
             next_pause: 0,
             told: None,
-            most_margin: MARGINS[MARGINS.len() - 1],
+            most_margin: WIDEST,
             prices: Prices::new(timed),
         }
     }
@@ -215,7 +224,7 @@ impl Motion {
             self.pause -= 1;
         } else {
             self.keeping = self.begin(plan, boxes);
-            self.prices.fade(1 + u64::from(self.next_pause));
+            self.fade(1 + u64::from(self.next_pause));
             if let Some(keeping) = self.keeping {
                 self.prices.begin(keeping.cost, self.scratch(boxes.len()));
                 (self.next_pause, self.displacement) = (0, Displacement::default());
@@ -247,7 +256,7 @@ impl Motion {
     /// Stops keeping, because it did not pay or there were `too_many` pairs.
     pub(super) fn stop(&mut self, too_many: bool) {
         let Some(failed) = self.keeping.take() else { return };
-        if too_many || failed.tests > 0.5 * failed.cost {
+        if too_many || failed.tests > OVER_PROMISED * failed.promised_tests {
             self.most_margin = (0.5 * failed.margin.share).max(MARGINS[0]);
         }
         self.prices.failed(too_many);
@@ -260,14 +269,21 @@ impl Motion {
         // It holds boxes from before these frames.
         self.displacement = Displacement::default();
         (self.pause, self.next_pause) = (0, 0);
-        self.prices.fade(frames);
+        self.fade(frames);
         self.prices.searchers.resume();
+    }
+
+    /// Lets the memory of failures fade over frames without kept pairs.
+    fn fade(&mut self, frames: u64) {
+        self.most_margin = (self.most_margin * (frames as f32 / RELAXING).exp()).min(WIDEST);
+        self.prices.fade(frames);
     }
 
     /// Forgets the costs of a box, because the number of boxes has changed by a factor of two or more. `widths`:
     /// initial positions of the thread counts with kept pairs and from scratch.
     pub(super) fn resize(&mut self, widths: [usize; 2]) {
         self.interrupt();
+        self.most_margin = (self.most_margin * WIDEST).sqrt();
         self.prices.forget(widths);
     }
 
@@ -378,14 +394,14 @@ impl Motion {
             1.5 * cost::left(far, k.nodes) * k.leaving,
         );
         if leave > 1.2 * keep {
-            k.margin.share = (m * MARGIN_STEP).min(MARGINS[MARGINS.len() - 1]);
+            k.margin.share = (m * MARGIN_STEP).min(WIDEST);
         } else if keep > 1.2 * leave && leave > RARE * keep {
             k.margin.share = (m / MARGIN_STEP).max(MARGINS[0]);
         }
         k.pace = self.told.unwrap_or(k.pace);
         k.frames = k.frames.saturating_add(1);
         if k.frames == PROVEN {
-            self.most_margin = MARGINS[MARGINS.len() - 1];
+            self.most_margin = WIDEST;
         }
         self.prices.pays(took, now, scratch)
     }
@@ -419,6 +435,7 @@ impl Motion {
             pace: motion,
             cost: cost(best),
             tests: 0.0,
+            promised_tests: cost::tests(far, kept),
             leaving: cost::leaving(motion, best),
             kept,
             nodes: NODES,

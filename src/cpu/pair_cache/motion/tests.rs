@@ -129,7 +129,7 @@ fn where_no_boxes_overlap_the_margin_is_no_larger_than_slow_boxes_need_and_few_p
 }
 
 #[test]
-fn a_margin_that_keeps_too_many_pairs_is_halved_and_one_that_too_many_leave_is_not() {
+fn a_margin_that_keeps_too_many_pairs_shrinks_and_one_that_too_many_leave_does_not() {
     let margin_after = |kept_pairs: usize, left: usize| {
         let mut boxes = vec![Aabb::cube([0.0; 3], 0.5); 1000];
         let mut motion = Motion::new(false);
@@ -148,6 +148,33 @@ fn a_margin_that_keeps_too_many_pairs_is_halved_and_one_that_too_many_leave_is_n
         keep(&mut motion) / first
     };
     let (crowded, restless) = (margin_after(40_000, 0), margin_after(0, 1000));
-    assert!(crowded <= 0.5, "{crowded}");
+    assert!(crowded < 0.9, "{crowded}");
     assert!(restless > 0.9, "{restless}");
+}
+
+/// On cold caches a first try may fail though no more pairs were kept than promised. It must not lower the margin for
+/// good: with too small a margin no later try promises anything.
+#[test]
+fn a_try_that_was_only_slow_leaves_the_margin_and_a_crowded_one_lowers_it_for_a_time() {
+    let boxes = vec![Aabb::cube([0.0; 3], 0.5); 1000];
+    let plan = FramePlan::default().with_moved(Some(0.03));
+    let most_margin_after = |kept_pairs: usize| {
+        let mut motion = Motion::new(true);
+        motion.found(1000, 500);
+        let begins = |motion: &mut Motion| {
+            motion.found_from_scratch(1000, 500, Some(20.0));
+            motion.advise(&plan, &boxes).is_some()
+        };
+        assert!((0..20).any(|_| begins(&mut motion)), "it never begins");
+        let changes = Changes { left: 10, jumped: 0, new: 0..0, gone: 0..0 };
+        let did = Work { kept_pairs, grown_again: 0, nodes: 120, rebuilt: false };
+        assert!((0..1000).any(|_| !motion.learn(1000, &changes, &did, Some(30.0))), "it never ceases to pay");
+        motion.stop(false);
+        motion
+    };
+    assert_eq!(most_margin_after(500).most_margin, WIDEST);
+    let mut crowded = most_margin_after(20_000);
+    assert!(crowded.most_margin < WIDEST);
+    crowded.missed(100_000);
+    assert_eq!(crowded.most_margin, WIDEST);
 }
