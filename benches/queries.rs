@@ -13,7 +13,7 @@ use obvhs::ray::{Ray as PeerRay, RayHit};
 // `traverse` names it.
 use glam::UVec2;
 use parry3d::bounding_volume::Aabb as ParryBounds;
-use parry3d::partitioning::{Bvh, BvhBuildStrategy};
+use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
 use parry3d::query::Ray as ParryRay;
 use rustix::time::{ClockId, clock_gettime};
 use sapwise::Aabb;
@@ -40,9 +40,32 @@ fn count(found: &mut Found, value: u32) {
 
 trait Contestant {
     fn name(&self) -> &'static str;
-    fn first_hits(&self, rays: &[Ray]) -> Found;
-    fn all_hits(&self, rays: &[Ray]) -> Found;
-    fn regions(&self, regions: &[Aabb]) -> Found;
+    fn first_hit(&self, ray: &Ray, found: &mut Found);
+    fn all_hits(&self, ray: &Ray, found: &mut Found);
+    fn region(&self, region: &Aabb, found: &mut Found);
+
+    /// Runs all queries of one kind. Each tree has its own copy of this function: no call of a query is virtual.
+    fn run(&self, Queries { rays, regions }: &Queries, kind: Kind) -> Found {
+        let mut found = (0, 0);
+        match kind {
+            Kind::FirstHit => rays.iter().for_each(|ray| self.first_hit(ray, &mut found)),
+            Kind::AllHits => rays.iter().for_each(|ray| self.all_hits(ray, &mut found)),
+            Kind::Region => regions.iter().for_each(|region| self.region(region, &mut found)),
+        }
+        found
+    }
+}
+
+struct Queries {
+    rays: Vec<Ray>,
+    regions: Vec<Aabb>,
+}
+
+#[derive(Clone, Copy)]
+enum Kind {
+    FirstHit,
+    AllHits,
+    Region,
 }
 
 impl Contestant for Tree {
@@ -50,38 +73,26 @@ impl Contestant for Tree {
         "sapwise"
     }
 
-    fn first_hits(&self, rays: &[Ray]) -> Found {
-        let mut found = (0, 0);
-        for ray in rays {
-            let mut first = f32::INFINITY;
-            self.cast_box(&Aabb::new(ray.origin, ray.origin), ray.direction, ray.max, |_, t| {
-                first = t;
-                t
-            });
-            if first < f32::INFINITY {
-                count(&mut found, first.to_bits());
-            }
+    fn first_hit(&self, ray: &Ray, found: &mut Found) {
+        let mut first = f32::INFINITY;
+        self.cast_box(&Aabb::new(ray.origin, ray.origin), ray.direction, ray.max, |_, t| {
+            first = t;
+            t
+        });
+        if first < f32::INFINITY {
+            count(found, first.to_bits());
         }
-        found
     }
 
-    fn all_hits(&self, rays: &[Ray]) -> Found {
-        let mut found = (0, 0);
-        for ray in rays {
-            self.cast_box(&Aabb::new(ray.origin, ray.origin), ray.direction, ray.max, |id, _| {
-                count(&mut found, id);
-                f32::INFINITY
-            });
-        }
-        found
+    fn all_hits(&self, ray: &Ray, found: &mut Found) {
+        self.cast_box(&Aabb::new(ray.origin, ray.origin), ray.direction, ray.max, |id, _| {
+            count(found, id);
+            f32::INFINITY
+        });
     }
 
-    fn regions(&self, regions: &[Aabb]) -> Found {
-        let mut found = (0, 0);
-        for region in regions {
-            self.overlapping(region, |id| count(&mut found, id));
-        }
-        found
+    fn region(&self, region: &Aabb, found: &mut Found) {
+        self.overlapping(region, |id| count(found, id));
     }
 }
 
@@ -96,40 +107,25 @@ impl Contestant for Parry {
         "parry3d Bvh"
     }
 
-    fn first_hits(&self, rays: &[Ray]) -> Found {
-        let mut found = (0, 0);
-        for ray in rays {
-            let peer = peer_ray(ray);
-            let to_box =
-                |id: u32, _| Some(self.bounds[id as usize].intersect_ray(&peer)).filter(|&t| t < f32::INFINITY);
-            let ray = ParryRay::new(ray.origin.into(), ray.direction.into());
-            if let Some((_, first)) = self.tree.cast_ray(&ray, f32::MAX, to_box) {
-                count(&mut found, first.max(0.0).to_bits());
-            }
+    fn first_hit(&self, ray: &Ray, found: &mut Found) {
+        let peer = peer_ray(ray);
+        let to_box = |id: u32, _| Some(self.bounds[id as usize].intersect_ray(&peer)).filter(|&t| t < f32::INFINITY);
+        let ray = ParryRay::new(ray.origin.into(), ray.direction.into());
+        if let Some((_, first)) = self.tree.cast_ray(&ray, f32::MAX, to_box) {
+            count(found, first.max(0.0).to_bits());
         }
-        found
     }
 
-    fn all_hits(&self, rays: &[Ray]) -> Found {
-        let mut found = (0, 0);
-        for ray in rays {
-            let ray = peer_ray(ray);
-            let meets = |node: &parry3d::partitioning::BvhNode| {
-                Bounds::new(node.mins().to_array().into(), node.maxs().to_array().into()).intersect_ray(&ray)
-                    < f32::INFINITY
-            };
-            self.tree.leaves(meets).for_each(|id| count(&mut found, id));
-        }
-        found
+    fn all_hits(&self, ray: &Ray, found: &mut Found) {
+        let ray = peer_ray(ray);
+        let bounds = |node: &BvhNode| Bounds::new(node.mins().to_array().into(), node.maxs().to_array().into());
+        let meets = |node: &BvhNode| bounds(node).intersect_ray(&ray) < f32::INFINITY;
+        self.tree.leaves(meets).for_each(|id| count(found, id));
     }
 
-    fn regions(&self, regions: &[Aabb]) -> Found {
-        let mut found = (0, 0);
-        for region in regions {
-            let region = ParryBounds::new(region.min.into(), region.max.into());
-            self.tree.intersect_aabb(&region).for_each(|id| count(&mut found, id));
-        }
-        found
+    fn region(&self, region: &Aabb, found: &mut Found) {
+        let region = ParryBounds::new(region.min.into(), region.max.into());
+        self.tree.intersect_aabb(&region).for_each(|id| count(found, id));
     }
 }
 
@@ -158,27 +154,19 @@ macro_rules! rays {
             self.name
         }
 
-        fn first_hits(&self, rays: &[Ray]) -> Found {
-            let mut found = (0, 0);
-            for ray in rays {
-                let mut hit = RayHit::none();
-                if self.tree.ray_traverse(peer_ray(ray), &mut hit, |ray, at| self.bounds[at].intersect_ray(ray)) {
-                    count(&mut found, hit.t.max(0.0).to_bits());
-                }
+        fn first_hit(&self, ray: &Ray, found: &mut Found) {
+            let mut hit = RayHit::none();
+            if self.tree.ray_traverse(peer_ray(ray), &mut hit, |ray, at| self.bounds[at].intersect_ray(ray)) {
+                count(found, hit.t.max(0.0).to_bits());
             }
-            found
         }
 
-        fn all_hits(&self, rays: &[Ray]) -> Found {
-            let mut found = (0, 0);
-            for ray in rays {
-                self.tree.ray_traverse_anyhit(peer_ray(ray), |ray, at| {
-                    if self.bounds[at].intersect_ray(ray) < f32::INFINITY {
-                        count(&mut found, self.ids[at]);
-                    }
-                });
-            }
-            found
+        fn all_hits(&self, ray: &Ray, found: &mut Found) {
+            self.tree.ray_traverse_anyhit(peer_ray(ray), |ray, at| {
+                if self.bounds[at].intersect_ray(ray) < f32::INFINITY {
+                    count(found, self.ids[at]);
+                }
+            });
         }
     };
 }
@@ -186,41 +174,33 @@ macro_rules! rays {
 impl Contestant for Obvhs<Bvh2> {
     rays!();
 
-    fn regions(&self, regions: &[Aabb]) -> Found {
-        let mut found = (0, 0);
-        for region in regions {
-            let region = Bounds::new(region.min.into(), region.max.into());
-            self.tree.aabb_traverse(region, |tree, node| {
-                let node = &tree.nodes[node as usize];
-                for at in (node.first_index as usize..).take(node.prim_count as usize) {
-                    if region.intersect_aabb(&self.bounds[at]) {
-                        count(&mut found, self.ids[at]);
-                    }
+    fn region(&self, region: &Aabb, found: &mut Found) {
+        let region = Bounds::new(region.min.into(), region.max.into());
+        self.tree.aabb_traverse(region, |tree, node| {
+            let node = &tree.nodes[node as usize];
+            for at in (node.first_index as usize..).take(node.prim_count as usize) {
+                if region.intersect_aabb(&self.bounds[at]) {
+                    count(found, self.ids[at]);
                 }
-                true
-            });
-        }
-        found
+            }
+            true
+        });
     }
 }
 
 impl Contestant for Obvhs<CwBvh> {
     rays!();
 
-    fn regions(&self, regions: &[Aabb]) -> Found {
-        let mut found = (0, 0);
-        for region in regions {
-            let region = Bounds::new(region.min.into(), region.max.into());
-            let mut state = self.tree.new_traversal([0.0; 3].into());
-            let mut node;
-            obvhs::traverse!(self.tree, node, state, node.intersect_aabb(&region, state.oct_inv4), {
-                let at = state.primitive_id as usize;
-                if region.intersect_aabb(&self.bounds[at]) {
-                    count(&mut found, self.ids[at]);
-                }
-            });
-        }
-        found
+    fn region(&self, region: &Aabb, found: &mut Found) {
+        let region = Bounds::new(region.min.into(), region.max.into());
+        let mut state = self.tree.new_traversal([0.0; 3].into());
+        let mut node;
+        obvhs::traverse!(self.tree, node, state, node.intersect_aabb(&region, state.oct_inv4), {
+            let at = state.primitive_id as usize;
+            if region.intersect_aabb(&self.bounds[at]) {
+                count(found, self.ids[at]);
+            }
+        });
     }
 }
 
@@ -250,17 +230,17 @@ fn cpu_ns() -> f64 {
 }
 
 /// Prints the median of each contestant, and ours over the fastest of the peers.
-fn race(label: &str, contestants: &[Box<dyn Contestant>], run: &dyn Fn(&dyn Contestant) -> Found) {
-    let expected = run(&*contestants[0]);
+fn race(label: &str, contestants: &[Box<dyn Contestant>], queries: &Queries, kind: Kind) {
+    let expected = contestants[0].run(queries, kind);
     for peer in &contestants[1..] {
-        assert_eq!(run(&**peer), expected, "{label}: {}", peer.name());
+        assert_eq!(peer.run(queries, kind), expected, "{label}: {}", peer.name());
     }
     let mut taken = vec![Vec::new(); contestants.len()];
     for round in 0..ROUNDS {
         for k in 0..contestants.len() {
             let at = (k + round) % contestants.len();
             let begin = cpu_ns();
-            black_box(run(black_box(&*contestants[at])));
+            black_box(black_box(&*contestants[at]).run(queries, kind));
             taken[at].push((cpu_ns() - begin) / QUERIES as f64);
         }
     }
@@ -296,8 +276,9 @@ fn main() {
             .collect();
         let regions: Vec<Aabb> =
             (0..QUERIES).map(|_| Aabb::cube(boxes[(unit() * BOXES as f32) as usize].min, HALF)).collect();
-        race(&format!("{scenario}, first hit"), &contestants, &|c| c.first_hits(&rays));
-        race(&format!("{scenario}, all hits"), &contestants, &|c| c.all_hits(&rays));
-        race(&format!("{scenario}, regions"), &contestants, &|c| c.regions(&regions));
+        let queries = Queries { rays, regions };
+        for (label, kind) in [("first hit", Kind::FirstHit), ("all hits", Kind::AllHits), ("regions", Kind::Region)] {
+            race(&format!("{scenario}, {label}"), &contestants, &queries, kind);
+        }
     }
 }

@@ -3,9 +3,9 @@
 mod common;
 
 use common::{
-    Algorithms, Random, assert_each_finds, assert_each_names_the_first_invalid, every_algorithm, large_boxes,
+    Algorithms, Random, assert_each_finds, assert_each_names_the_first_invalid, every_algorithm, large_boxes, naive,
+    scenes,
 };
-use common::{naive, scenes};
 use sapwise::algorithm::SimdLevel;
 use sapwise::{Aabb, BroadPhase, Error, PairOrder, Pairs};
 use sapwise_scenes::Scenario;

@@ -2,13 +2,17 @@
 
 mod common;
 
-use common::{Random, assert_each_finds, every_algorithm, naive, naive_filtered};
+use common::{Random, assert_each_finds, every_algorithm, filtered, naive, naive_filtered};
 use sapwise::{Aabb, BroadPhase, Error, Filter, Membership, PairOrder, Pairs, Registry};
 use sapwise_scenes::Scenario;
 
 /// Returns random memberships.
 fn memberships(count: usize, random: &mut Random) -> Vec<Membership> {
     (0..count).map(|_| random.membership()).collect()
+}
+
+fn of(groups: u32, mask: u32) -> Membership {
+    Membership { groups, mask, ..Membership::ALL }
 }
 
 #[test]
@@ -29,20 +33,14 @@ fn wanted_pairs_of_every_scenario() {
                 canonical.set_filter(Some(Filter::new(memberships.clone())));
                 any.set_filter(Some(Filter::new(memberships)));
                 for (id, algorithm) in &mut algorithms {
+                    let what = format!("{id} on {scenario}, frame {frame}");
                     algorithm.find_pairs(boxes, &mut canonical).unwrap();
                     let (found, wanted) = (canonical.len(), expected.len());
-                    assert!(
-                        canonical.as_slice() == expected,
-                        "{id} on {scenario}, frame {frame}: {found} pairs, not {wanted}"
-                    );
+                    assert!(canonical.as_slice() == expected, "{what}: {found} pairs, not {wanted}");
                     let searched = canonical.overlapping();
-                    assert!((wanted as u64..=all).contains(&searched), "{id} on {scenario}: {searched} of {all}");
+                    assert!((wanted as u64..=all).contains(&searched), "{what}: {searched} of {all}");
                     algorithm.find_pairs(boxes, &mut any).unwrap();
-                    assert_eq!(
-                        any.fingerprint(),
-                        canonical.fingerprint(),
-                        "{id} on {scenario}, frame {frame}, in any order"
-                    );
+                    assert_eq!(any.fingerprint(), canonical.fingerprint(), "{what}, in any order");
                 }
                 (0..if scenario == Scenario::Fragmentation { 90 } else { 1 }).for_each(|_| scene.advance());
             }
@@ -55,8 +53,7 @@ fn fixed_ground_has_no_pair_with_itself() {
     let mut scene = Scenario::StaticWorld.start(3000, 42);
     let fixed = |k| Membership { fixed: scene.is_fixed(k), ..Membership::ALL };
     let memberships: Vec<Membership> = (0..3000).map(fixed).collect();
-    let mut pairs = Pairs::with_order(PairOrder::Canonical);
-    pairs.set_filter(Some(Filter::new(memberships.clone())));
+    let mut pairs = filtered(&memberships);
     let mut algorithms = every_algorithm();
     for frame in 0..40 {
         let expected = naive_filtered(scene.boxes(), &memberships);
@@ -72,8 +69,7 @@ fn memberships_change_while_pairs_are_kept() {
     let mut algorithms = every_algorithm();
     let mut random = Random(71);
     let mut boxes = random.cubes(600, [11.0; 3], 0.6);
-    let mut pairs = Pairs::with_order(PairOrder::Canonical);
-    pairs.set_filter(Some(Filter::new(memberships(600, &mut random))));
+    let mut pairs = filtered(&memberships(600, &mut random));
     for frame in 0..60 {
         for b in &mut boxes {
             let by = (random.next() - 0.5) * 0.08;
@@ -128,7 +124,6 @@ fn fixed_boxes_are_freed_while_pairs_are_kept() {
 fn few_memberships_change_while_nothing_moves() {
     let mut random = Random(17);
     let boxes = random.cubes(1500, [11.0; 3], 0.6);
-    let of = |groups, mask| Membership { groups, mask, ..Membership::ALL };
     let kinds = [
         of(0b001, 0b010),
         of(0b010, 0b101),
@@ -136,8 +131,7 @@ fn few_memberships_change_while_nothing_moves() {
         Membership { owner: 5, ..Membership::ALL },
     ];
     let mut algorithms = every_algorithm();
-    let mut pairs = Pairs::with_order(PairOrder::Canonical);
-    pairs.set_filter(Some(Filter::new(vec![kinds[0]; 1450])));
+    let mut pairs = filtered(&[kinds[0]; 1450]);
     for frame in 0..24 {
         let changed = [0, 10, 700, 0, 90][frame % 5];
         let kinds = [&kinds[..2], &kinds[..3], &kinds[1..]][frame / 8];
@@ -159,7 +153,7 @@ fn kind_of(id: &str) -> (bool, usize) {
 
 #[test]
 fn forbidden_pile_is_not_searched() {
-    let kinds = [Membership { groups: 1, mask: 2, ..Membership::ALL }, Membership { fixed: true, ..Membership::ALL }];
+    let kinds = [of(1, 2), Membership { fixed: true, ..Membership::ALL }];
     for (id, mut algorithm) in every_algorithm() {
         let count = kind_of(&id).1;
         let mut pairs = Pairs::new();
@@ -178,15 +172,12 @@ fn forbidden_pile_is_not_searched() {
 fn crowd_is_searched_from_its_sensors() {
     const SENSORS: usize = 20;
     let boxes = Random(3).cubes(20_000, [7.0; 3], 0.5);
-    let of = |groups, mask| Membership { groups, mask, ..Membership::ALL };
-    let memberships: Vec<Membership> =
-        (0..boxes.len()).map(|k| if k < SENSORS { of(1, 2) } else { of(2, 1) }).collect();
+    let memberships: Vec<_> = (0..boxes.len()).map(|k| if k < SENSORS { of(1, 2) } else { of(2, 1) }).collect();
     for (id, mut algorithm) in every_algorithm() {
         let boxes = &boxes[..kind_of(&id).1];
         let meets = |i: usize| (SENSORS..boxes.len()).filter(move |&j| boxes[i].overlaps(&boxes[j]));
         let expected: Vec<_> = (0..SENSORS).flat_map(|i| meets(i).map(move |j| (i as u32, j as u32))).collect();
-        let mut pairs = Pairs::with_order(PairOrder::Canonical);
-        pairs.set_filter(Some(Filter::new(memberships.clone())));
+        let mut pairs = filtered(&memberships);
         for _ in 0..4 {
             algorithm.find_pairs(boxes, &mut pairs).unwrap();
             assert!(pairs.as_slice() == expected && !expected.is_empty(), "{id}: {} pairs", pairs.len());
@@ -218,8 +209,7 @@ fn bodies_are_not_searched_within() {
             .filter(|&k| others[k as usize].overlaps(rod))
             .map(|k| (k, others.len() as u32))
             .collect();
-        let mut pairs = Pairs::with_order(PairOrder::Canonical);
-        pairs.set_filter(Some(Filter::new(memberships)));
+        let mut pairs = filtered(&memberships);
         for _ in 0..4 {
             algorithm.find_pairs(&boxes, &mut pairs).unwrap();
             assert!(pairs.as_slice() == expected && !expected.is_empty(), "{id}: {} pairs", pairs.len());
@@ -232,10 +222,8 @@ fn bodies_are_not_searched_within() {
 fn limit_counts_wanted_pairs_only() {
     // All overlap. Of 1200 boxes the 100 of the second group collide with the 1100 of the first, and with nothing else.
     let boxes = [Aabb::cube([3.0; 3], 1.0); 1200];
-    let of = |k: usize| if k % 12 == 5 { (2, 1) } else { (1, 2) };
-    let membership = |k: usize| Membership { groups: of(k).0, mask: of(k).1, ..Membership::ALL };
-    let mut pairs = Pairs::with_order(PairOrder::Canonical);
-    pairs.set_filter(Some(Filter::new((0..1200).map(membership).collect())));
+    let memberships: Vec<_> = (0..1200).map(|k| if k % 12 == 5 { of(2, 1) } else { of(1, 2) }).collect();
+    let mut pairs = filtered(&memberships);
     for (id, mut algorithm) in every_algorithm() {
         for limit in [0, 1, 1000, 109_999] {
             pairs.set_limit(Some(limit));
@@ -265,8 +253,7 @@ fn users_algorithm_is_filtered() {
     let mut algorithm = registry.create(&"everything@cpu1".parse().unwrap()).unwrap();
     let boxes = [Aabb::cube([0.0; 3], 1.0); 300];
     let memberships = memberships(290, &mut Random(5));
-    let mut pairs = Pairs::with_order(PairOrder::Canonical);
-    pairs.set_filter(Some(Filter::new(memberships.clone())));
+    let mut pairs = filtered(&memberships);
     algorithm.find_pairs(&boxes, &mut pairs).unwrap();
     assert!(pairs.as_slice() == naive_filtered(&boxes, &memberships));
 }

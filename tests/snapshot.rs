@@ -100,10 +100,8 @@ fn bounds_read_back_as_they_were() {
     let b = Aabb::new([odd[0], odd[1], odd[2]], [odd[3], odd[4], odd[5]]);
     let text = serde_json::to_string(&b).unwrap();
     let read: Aabb = serde_json::from_str(&text).unwrap();
-    assert_eq!(
-        (read.min.map(f32::to_bits), read.max.map(f32::to_bits)),
-        (b.min.map(f32::to_bits), b.max.map(f32::to_bits))
-    );
+    let bits = |b: &Aabb| [b.min, b.max].map(|corner| corner.map(f32::to_bits));
+    assert_eq!(bits(&read), bits(&b));
     let whole: Aabb = serde_json::from_str(r#"{ "min": [-1, 0, "-inf"], "max": [1, 2.5, "inf"] }"#).unwrap();
     assert_eq!(whole, Aabb::new([-1.0, 0.0, f32::NEG_INFINITY], [1.0, 2.5, f32::INFINITY]));
     assert!(serde_json::from_str::<Aabb>(r#"{ "min": [0, 0], "max": [1, 1, 1] }"#).is_err());

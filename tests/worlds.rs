@@ -2,13 +2,9 @@
 
 mod common;
 
-use common::{Random, at_every_level, every_algorithm, naive_filtered};
+use common::{Random, at_every_level, every_algorithm, filtered, naive_filtered};
 use sapwise::internals::Pair;
 use sapwise::{Aabb, Error, Filter, Membership, PairOrder, Pairs, Worlds};
-
-fn every_search() -> Vec<(String, Worlds)> {
-    at_every_level(Worlds::new)
-}
 
 /// Returns the boxes of worlds of `counts` boxes, and the starts. Some boxes are large, infinite or appear twice.
 fn worlds(counts: impl Iterator<Item = usize>, random: &mut Random) -> (Vec<Aabb>, Vec<usize>) {
@@ -68,7 +64,7 @@ fn assert_agree(boxes: &[Aabb], starts: &[usize], memberships: &[Membership], se
 
 #[test]
 fn pairs_are_those_of_each_world() {
-    let mut searches = every_search();
+    let mut searches = at_every_level(Worlds::new);
     let mut random = Random(23);
     let scenes: [Vec<usize>; 6] = [
         // All sizes around every vector and every word.
@@ -101,12 +97,11 @@ fn equal_worlds_have_the_same_pairs() {
     let memberships: Vec<Membership> = (0..boxes.len())
         .map(|k| Membership { groups: 1 << (k / 31), mask: 1 << (k / 31), ..Membership::ALL })
         .collect();
-    assert_agree(&boxes, &starts, &[], &mut every_search());
+    assert_agree(&boxes, &starts, &[], &mut at_every_level(Worlds::new));
     let pairs = naive_filtered(&one, &[]).len();
     assert!(pairs > 10);
     for (id, mut algorithm) in every_algorithm() {
-        let mut found = Pairs::new();
-        found.set_filter(Some(Filter::new(memberships.clone())));
+        let mut found = filtered(&memberships);
         algorithm.find_pairs(&boxes, &mut found).unwrap();
         assert!(found.len() == 32 * pairs && found.iter().all(|(i, j)| i / 31 == j / 31), "{id}");
     }
@@ -118,7 +113,7 @@ fn wrong_input_is_an_error() {
     let (boxes, starts) = worlds([600, 31, 300, 20].into_iter().cycle().take(60), &mut random);
     let count = boxes.len();
     let mut pairs = Pairs::new();
-    for (name, search) in &mut every_search() {
+    for (name, search) in &mut at_every_level(Worlds::new) {
         for (wrong, index, start) in
             [(vec![], 0, 0), (vec![0], 0, 0), (vec![1, count], 0, 1), (vec![0, 9, 8, count], 2, 8), (vec![0, 9], 1, 9)]
         {

@@ -5,7 +5,7 @@ use sapwise::algorithm::{Entry, Load, SimdLevel};
 use sapwise::error::BoxDefect;
 use sapwise::internals::Pair;
 use sapwise::tuning::{AlgorithmCost, CostCurve, CostTerm, Source, Term};
-use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Membership, Pairs, Registry, Tuning};
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Filter, Membership, PairOrder, Pairs, Registry, Tuning};
 
 /// Algorithms with their names.
 pub(crate) type Algorithms = Vec<(String, Box<dyn BroadPhase>)>;
@@ -98,6 +98,13 @@ pub(crate) fn every_algorithm() -> Algorithms {
         }
     }
     all
+}
+
+/// Returns an empty list in canonical order with the filter of these memberships.
+pub(crate) fn filtered(memberships: &[Membership]) -> Pairs {
+    let mut pairs = Pairs::with_order(PairOrder::Canonical);
+    pairs.set_filter(Some(Filter::new(memberships.to_vec())));
+    pairs
 }
 
 /// The oracle with a filter, by its definition.

@@ -385,9 +385,9 @@ impl Run<'_> {
         }
         let handle = self.handle();
         let known = self.model.bodies.contains_key(&handle);
-        assert!(
-            self.spaces.iter().all(|space| space.contains(handle) == known && space.get(handle).is_some() == known)
-        );
+        for space in &self.spaces {
+            assert_eq!([space.contains(handle), space.get(handle).is_some()], [known; 2], "{handle}");
+        }
     }
 
     fn query(&mut self) {

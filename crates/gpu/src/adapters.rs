@@ -43,15 +43,8 @@ impl Gpus {
         let mut adapters: Vec<(wgpu::AdapterInfo, wgpu::Adapter)> =
             infos.iter().cloned().zip(adapters).enumerate().filter(|(k, _)| keep(*k)).map(|(_, found)| found).collect();
         adapters.sort_by_key(|(info, _)| kind(info.device_type));
-        let found = adapters.into_iter().enumerate().map(|(k, (info, adapter))| {
-            Arc::new(Found {
-                identity: identity(k as u32, &info),
-                adapter: Some(adapter),
-                opened: Mutex::default(),
-                wait_limit: Mutex::default(),
-            })
-        });
-        Self { found: found.collect() }
+        let found = adapters.into_iter().zip(0..);
+        Self { found: found.map(|((info, adapter), k)| Found::new(identity(k, &info), Some(adapter), None)).collect() }
     }
 
     /// GPUs that the program opened itself, under the numbers of their identities. Algorithms work on its devices and
@@ -74,12 +67,7 @@ impl Gpus {
         for gpu in gpus {
             let identity = gpu.identity().clone();
             if !found.iter().any(|f| f.identity.index == identity.index) {
-                found.push(Arc::new(Found {
-                    identity,
-                    adapter: None,
-                    opened: Mutex::new(Some(Ok(gpu))),
-                    wait_limit: Mutex::default(),
-                }));
+                found.push(Found::new(identity, None, Some(Ok(gpu))));
             }
         }
         found.sort_by_key(|f| f.identity.index);
@@ -191,6 +179,10 @@ pub(super) async fn adapters() -> Vec<wgpu::Adapter> {
 }
 
 impl Found {
+    fn new(identity: GpuIdentity, adapter: Option<wgpu::Adapter>, opened: Option<Result<Gpu, GpuError>>) -> Arc<Self> {
+        Arc::new(Self { identity, adapter, opened: Mutex::new(opened), wait_limit: Mutex::default() })
+    }
+
     fn open(&self) -> Result<Gpu, GpuError> {
         let Some(adapter) = &self.adapter else {
             let text = format!("gpu{} is the program's own device, which can't be opened again", self.identity.index);

@@ -14,12 +14,16 @@ pub(super) struct Cells {
     add_up: Kernel,
     begin: Kernel,
     put: Kernel,
-    /// Cell and reach of each box, in the order of the input.
-    keys: Storage,
-    ranks: Storage,
-    order: Storage,
-    sorted_keys: Storage,
-    table: Storage,
+    /// Cell and reach of each box, in the order of the input. The caller fills them.
+    pub(super) keys: Storage,
+    /// Rank of each box in its cell. The caller fills them.
+    pub(super) ranks: Storage,
+    /// Old position of each sorted box.
+    pub(super) order: Storage,
+    /// Cells of the sorted boxes, which `gather_cells` fills.
+    pub(super) sorted_keys: Storage,
+    /// Counts of the cells, which the caller fills, then the beginnings of the cells.
+    pub(super) table: Storage,
     sums: Storage,
     bound: Option<[Bound; 3]>,
 }
@@ -64,26 +68,6 @@ impl Cells {
             self.put.bind(gpu, &[(0, params), (3, table), (4, keys), (5, ranks), (6, order)])?,
         ]);
         Ok(())
-    }
-
-    /// Returns the buffers of the keys, of the counts of the cells, and of the rank of each box in its cell, which
-    /// the caller fills.
-    pub(super) fn unsorted(&self) -> [&wgpu::Buffer; 3] {
-        [self.keys.buffer(), self.table.buffer(), self.ranks.buffer()]
-    }
-
-    /// Returns the buffer that has the old position of each sorted box.
-    pub(super) fn order(&self) -> &wgpu::Buffer {
-        self.order.buffer()
-    }
-
-    /// Returns the buffer of the cells of the sorted boxes, which `gather_cells` fills.
-    pub(super) fn sorted_keys(&self) -> &wgpu::Buffer {
-        self.sorted_keys.buffer()
-    }
-
-    pub(super) fn table(&self) -> &wgpu::Buffer {
-        self.table.buffer()
     }
 
     /// Clears the counts, before the keys are written.

@@ -42,11 +42,13 @@ const SPARE_PAIRS: u64 = 256;
 #[derive(Debug)]
 pub(super) struct Engine {
     pub(super) gpu: Gpu,
-    search: Box<dyn Search>,
+    pub(super) search: Box<dyn Search>,
     home: Home,
-    output: Output,
+    /// With the list of pairs of the previous frame.
+    pub(super) output: Output,
     params: Storage,
-    header: Storage,
+    /// The [`Header`], which the program's kernels may read.
+    pub(super) header: Storage,
     boxes: Storage,
     ids: Storage,
     memberships: Memberships,
@@ -149,11 +151,6 @@ impl Engine {
         // A sorted box takes more bytes than anything else that each box has.
         let most = largest(&self.gpu, wgpu::BufferUsages::STORAGE) / MOST_OF_BOX;
         usize::try_from(most).unwrap_or(usize::MAX).min(self.search.most_objects())
-    }
-
-    /// Returns the power of the number of boxes with which the work of the method grows.
-    pub(super) fn growth(&self) -> f64 {
-        self.search.growth()
     }
 
     /// Returns the parameters of a frame; see [`Search::plan`].

@@ -54,10 +54,7 @@ mod tests {
         let gpus: Vec<GpuIdentity> = (0..).zip(kinds).map(|(index, kind)| GpuIdentity::new(index, "", kind)).collect();
         let ids = algorithms(&gpus).into_iter().map(|entry| entry.id.to_string());
         let strips: Vec<String> = ids.filter(|id| id.starts_with("grid-sap")).collect();
-        assert_eq!(
-            strips,
-            ["grid-sap@gpu0", "grid-sap@gpu1", "grid-sap@gpu0+1", "grid-sap@gpu2", "grid-sap@gpu3", "grid-sap@gpu2+3"]
-        );
+        assert_eq!(strips, ["0", "1", "0+1", "2", "3", "2+3"].map(|set| format!("grid-sap@gpu{set}")));
         assert!(algorithms(&[]).is_empty());
     }
 }

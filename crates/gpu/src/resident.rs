@@ -93,7 +93,7 @@ impl Resident {
     /// don't fit into the largest buffer of the GPU, or the GPU was lost.
     pub fn find_pairs(&mut self, boxes: &wgpu::Buffer, objects: u32) -> Result<ResidentPairs<'_>, Error> {
         let count = self.run(boxes, objects).map_err(|failure| failure.of(&self.id))?;
-        Ok(ResidentPairs { buffer: self.engine.pairs_buffer(), count })
+        Ok(ResidentPairs { buffer: self.engine.output.pairs(), count })
     }
 
     /// Submits the same frame without waiting. Kernels that follow on the same queue can read the pairs and their
@@ -111,7 +111,7 @@ impl Resident {
     /// [`Error::Unavailable`] too if `brute` gets more boxes than one submission takes (46 000).
     pub fn submit(&mut self, boxes: &wgpu::Buffer, objects: u32) -> Result<SubmittedPairs<'_>, Error> {
         self.run_ahead(boxes, objects).map_err(|failure| failure.of(&self.id))?;
-        Ok(SubmittedPairs { pairs: self.engine.pairs_buffer(), counts: self.engine.header_buffer() })
+        Ok(SubmittedPairs { pairs: self.engine.output.pairs(), counts: self.engine.header.buffer() })
     }
 
     /// Sets the filter of the next frames, or lifts it. Uploads 16 bytes for each membership.

@@ -67,7 +67,7 @@ impl Share {
             return;
         }
         let Members { boxes, ids } = &self.members;
-        self.work += (boxes.len() as f64).powf(self.engine.growth());
+        self.work += (boxes.len() as f64).powf(self.engine.search.growth());
         let look = || Look::at(&SampledBoxes::from(boxes.as_slice()));
         let plan = |engine: &Engine| engine.plan(boxes.len() as u32, look);
         let started = pollster::block_on(self.engine.start(boxes, Some(ids), plan, &Workers::one()));
@@ -90,7 +90,7 @@ impl Share {
 /// Returns the share of the boxes for each GPU, so that all take the same time.
 pub(super) fn sizes(parts: &[Share]) -> Vec<f64> {
     let known: Option<Vec<f64>> =
-        parts.iter().map(|part| part.speed.map(|speed| speed.powf(1.0 / part.engine.growth()))).collect();
+        parts.iter().map(|part| part.speed.map(|speed| speed.powf(1.0 / part.engine.search.growth()))).collect();
     let weights = known.unwrap_or_else(|| vec![1.0; parts.len()]);
     let total: f64 = weights.iter().sum();
     let bounded: Vec<f64> = weights.iter().map(|w| (w / total).max(SMALLEST_SHARE)).collect();

@@ -17,11 +17,13 @@ const ADDERS: u32 = 32;
 pub(super) struct Sort {
     add_counts: Kernel,
     scatter: Kernel,
-    /// Each pass reads one of the two and writes the other.
-    keys: [Storage; 2],
-    values: [Storage; 2],
-    /// For each pass the counts of each digit and block.
-    counts: Storage,
+    /// Each pass reads one of the two and writes the other. The caller fills the first one.
+    pub(super) keys: [Storage; 2],
+    /// Old position of each sorted key: in the first one after an even number of passes, in the second one after an odd
+    /// number.
+    pub(super) values: [Storage; 2],
+    /// For each pass the counts of each digit and block. The caller fills those of the first pass.
+    pub(super) counts: Storage,
     starts: Storage,
     /// The number of each pass.
     tasks: Vec<wgpu::Buffer>,
@@ -69,16 +71,6 @@ impl Sort {
             self.passes.push([self.add_counts.bind(gpu, &common)?, scatter]);
         }
         Ok(())
-    }
-
-    /// Returns the buffers of the keys and of the counts of their first digits, which the caller fills.
-    pub(super) fn unsorted(&self) -> [&wgpu::Buffer; 2] {
-        [self.keys[0].buffer(), self.counts.buffer()]
-    }
-
-    /// Returns the buffers that have the old position of each sorted key after an even and an odd number of passes.
-    pub(super) fn orders(&self) -> [&wgpu::Buffer; 2] {
-        [self.values[0].buffer(), self.values[1].buffer()]
     }
 
     /// Clears the counts, before the keys are written.

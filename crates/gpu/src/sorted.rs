@@ -132,24 +132,23 @@ impl Search for Sorted {
         let sorted = self.boxes.buffer();
         let mut make_keys = vec![(0, params), (1, boxes), (2, ids), (3, header)];
         let mut gather = vec![(0, params), (1, boxes), (2, ids), (5, sorted)];
-        let orders;
+        let orders: Vec<&wgpu::Buffer>;
         let mut rows = vec![(2, sorted), (6, self.rows.buffer()), (7, self.kept.buffer())];
         let mut table = None;
         match &mut self.order {
             Order::Radix(sort) => {
                 sort.bind(gpu, params)?;
-                let [keys, counts] = sort.unsorted();
-                make_keys.extend([(4, keys), (5, counts)]);
-                orders = sort.orders().to_vec();
+                make_keys.extend([(4, sort.keys[0].buffer()), (5, sort.counts.buffer())]);
+                orders = sort.values.iter().map(Storage::buffer).collect();
             }
             Order::Cells(cells) => {
                 cells.bind(gpu, params)?;
-                let [keys, counts, ranks] = cells.unsorted();
-                make_keys.extend([(4, keys), (5, counts), (6, ranks)]);
-                orders = vec![cells.order()];
-                gather.extend([(6, keys), (7, cells.table()), (8, cells.sorted_keys())]);
-                rows.extend([(1, cells.sorted_keys()), (8, cells.table())]);
-                table = Some(cells.table());
+                let [keys, counts, sorted_keys] = [&cells.keys, &cells.table, &cells.sorted_keys].map(Storage::buffer);
+                make_keys.extend([(4, keys), (5, counts), (6, cells.ranks.buffer())]);
+                orders = vec![cells.order.buffer()];
+                gather.extend([(6, keys), (7, counts), (8, sorted_keys)]);
+                rows.extend([(1, sorted_keys), (8, counts)]);
+                table = Some(counts);
             }
         }
         if let Some(tree) = &mut self.tree {
@@ -238,7 +237,7 @@ mod tests {
         sorted.record_sort(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()), &params);
         gpu.submit(encoder).unwrap();
         let Order::Cells(cells) = &sorted.order else { panic!("grid-sap sorts by cells") };
-        let keys = gpu.read_words(cells.unsorted()[0], 2 * u64::from(params.objects)).unwrap();
+        let keys = gpu.read_words(cells.keys.buffer(), 2 * u64::from(params.objects)).unwrap();
         for (k, key) in keys.chunks(2).enumerate() {
             let (cell, reach) = (key[0], key[1] & 0x3fff_ffff);
             let last = if cell < params.large_key { cell % params.slots + reach } else { reach };

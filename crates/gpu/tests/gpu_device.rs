@@ -5,28 +5,21 @@
 mod common;
 
 use common::gpu::upload;
-use common::{Random, gpus, naive};
+use common::{METHODS, Random, gpus, naive, programs_own, with_gpus};
 use sapwise::error::{GpuErrorKind, Unavailable};
-use sapwise::{Aabb, BroadPhase, Error, PairOrder, Pairs, Registry};
+use sapwise::{Aabb, BroadPhase, Error, PairOrder, Pairs};
 use sapwise_gpu::{Gpu, Gpus, Resident, broad_phase, wgpu30 as wgpu};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
 
 /// Opens a device as a program does: with wgpu's default limits and no feature.
-fn device(gpus: &Gpus, index: u32) -> (wgpu::Device, wgpu::Queue) {
-    let adapter = gpus.adapter(index).unwrap();
-    pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor::default())).unwrap()
-}
-
-/// Returns the device as a GPU for a registry.
-fn shared(index: u32, device: &wgpu::Device, queue: &wgpu::Queue) -> Gpu {
-    Gpu::from_parts(device.clone(), queue.clone(), sapwise_gpu::identity(index, &device.adapter_info()))
+fn shared(gpus: &Gpus, index: u32) -> Gpu {
+    programs_own(gpus, index, &wgpu::DeviceDescriptor::default())
 }
 
 /// The program's own work: numbers go to one buffer, to another and back.
 struct Own {
-    device: wgpu::Device,
-    queue: wgpu::Queue,
+    gpu: Gpu,
     buffers: [wgpu::Buffer; 2],
     back: wgpu::Buffer,
     turn: u32,
@@ -35,29 +28,31 @@ struct Own {
 impl Own {
     const WORDS: usize = 4096;
 
-    fn new(device: &wgpu::Device, queue: &wgpu::Queue) -> Self {
+    fn new(gpu: &Gpu) -> Self {
         use wgpu::BufferUsages as U;
         let buffer = |usage| {
             let size = 4 * Self::WORDS as u64;
-            device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
+            let descriptor = wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false };
+            gpu.device().create_buffer(&descriptor)
         };
         let buffers = [0, 1].map(|_| buffer(U::COPY_SRC | U::COPY_DST));
-        Self { device: device.clone(), queue: queue.clone(), buffers, back: buffer(U::MAP_READ | U::COPY_DST), turn: 0 }
+        Self { gpu: gpu.clone(), buffers, back: buffer(U::MAP_READ | U::COPY_DST), turn: 0 }
     }
 
     /// Does one round, and compares what came back.
     fn work(&mut self) {
+        let (device, queue) = (self.gpu.device(), self.gpu.queue());
         self.turn += 1;
         let sent: Vec<u8> = (0..Self::WORDS as u32).flat_map(|k| (k ^ self.turn << 16).to_le_bytes()).collect();
-        self.queue.write_buffer(&self.buffers[0], 0, &sent);
-        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        queue.write_buffer(&self.buffers[0], 0, &sent);
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         encoder.copy_buffer_to_buffer(&self.buffers[0], 0, &self.buffers[1], 0, sent.len() as u64);
         encoder.copy_buffer_to_buffer(&self.buffers[1], 0, &self.back, 0, sent.len() as u64);
-        self.queue.submit([encoder.finish()]);
+        queue.submit([encoder.finish()]);
         let (mapped, told) = std::sync::mpsc::channel();
         self.back.slice(..).map_async(wgpu::MapMode::Read, move |result| mapped.send(result).unwrap());
         // Whoever polls first runs the callback: it may have been another thread.
-        self.device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
+        device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
         told.recv().unwrap().unwrap();
         assert!(*self.back.slice(..).get_mapped_range().unwrap() == *sent, "the program's own work went wrong");
         self.back.unmap();
@@ -76,13 +71,12 @@ fn our_work_and_the_programs_share_a_queue() {
     let boxes = Random(21).cubes(2500, [14.0; 3], 0.5);
     let expected = naive(&boxes);
     for index in gpus.identities().map(|g| g.index) {
-        let (device, queue) = device(&gpus, index);
-        let mut registry = Registry::with_cores(1);
-        sapwise_gpu::add_to(&mut registry, &Gpus::of([shared(index, &device, &queue)]));
+        let gpu = shared(&gpus, index);
+        let registry = with_gpus(&Gpus::of([gpu.clone()]));
         let ids = registry.available().into_iter().map(|e| e.id).filter(|id| id.to_string().contains("@gpu"));
         let mut algorithms: Vec<_> = ids.map(|id| (id.to_string(), registry.create(&id).unwrap())).collect();
         assert_eq!(algorithms.len(), 4);
-        let mut own = Own::new(&device, &queue);
+        let mut own = Own::new(&gpu);
         // In turn, as within a frame.
         for (id, algorithm) in &mut algorithms {
             own.work();
@@ -144,21 +138,21 @@ fn the_programs_handlers_get_only_its_own_errors() {
     let boxes = Random(22).cubes(800, [9.0; 3], 0.5);
     let expected = naive(&boxes);
     for index in gpus.identities().map(|g| g.index) {
-        let (device, queue) = device(&gpus, index);
-        let handlers = Handlers::of(&device);
-        let gpu = shared(index, &device, &queue);
+        let gpu = shared(&gpus, index);
+        let device = gpu.device();
+        let handlers = Handlers::of(device);
         let mut algorithm = broad_phase("grid-sap", vec![gpu.clone()]).unwrap();
         let mut resident = Resident::new(&gpu, "sap").unwrap();
         agree("grid-sap", algorithm.as_mut(), &boxes, &expected);
         // Our errors: a submission with a destroyed buffer, and a kernel that is bound to one.
-        let there = upload(&device, &queue, &boxes, wgpu::BufferUsages::STORAGE);
+        let there = upload(&gpu, &boxes, wgpu::BufferUsages::STORAGE);
         assert_eq!(resident.find_pairs(&there, 800).unwrap().count as usize, expected.len());
         there.destroy();
         for _ in 0..2 {
             let error = resident.find_pairs(&there, 800).unwrap_err();
             assert_eq!(kind(&error), Some(GpuErrorKind::Refused), "gpu{index}: {error:#}");
         }
-        let other = upload(&device, &queue, &boxes, wgpu::BufferUsages::STORAGE);
+        let other = upload(&gpu, &boxes, wgpu::BufferUsages::STORAGE);
         other.destroy();
         assert_eq!(kind(&resident.find_pairs(&other, 800).unwrap_err()), Some(GpuErrorKind::Refused));
         assert!(handlers.errors().is_empty(), "gpu{index}: {:?}", handlers.errors());
@@ -185,11 +179,12 @@ fn the_programs_handlers_get_only_its_own_errors() {
 #[test]
 fn a_lost_device_of_the_program_is_an_error() {
     let Some(gpus) = gpus() else { return };
-    let (device, queue) = device(&gpus, 0);
+    let opened = shared(&gpus, 0);
+    let (device, identity) = (opened.device().clone(), opened.identity().clone());
     let handlers = Handlers::of(&device);
     device.destroy();
-    let gpu = shared(0, &device, &queue);
-    for method in ["brute", "sap", "grid-sap", "bvh"] {
+    let gpu = Gpu::from_parts(device, opened.queue().clone(), identity);
+    for method in METHODS {
         let made = broad_phase(method, vec![gpu.clone()]);
         let found = made.and_then(|mut algorithm| {
             algorithm.prepare(1000);
@@ -204,13 +199,16 @@ fn a_lost_device_of_the_program_is_an_error() {
 fn given_gpus_are_listed_once_by_number() {
     let Some(gpus) = gpus() else { return };
     let found = gpus.identities().next().unwrap();
-    let (device, queue) = device(&gpus, found.index);
-    let gpu = |index| shared(index, &device, &queue);
-    assert_eq!(gpu(found.index).identity(), found);
+    let own = shared(&gpus, found.index);
+    assert_eq!(own.identity(), found);
+    let gpu = |index| {
+        let identity = sapwise_gpu::identity(index, &own.device().adapter_info());
+        Gpu::from_parts(own.device().clone(), own.queue().clone(), identity)
+    };
     let given = Gpus::of([gpu(2), gpu(0), gpu(2)]);
     assert_eq!(given.identities().map(|g| g.index).collect::<Vec<_>>(), [0, 2]);
     assert!(given.adapter(0).is_none() && Gpus::of([]).is_empty());
-    assert_eq!(given.open(2).unwrap().device(), &device);
+    assert_eq!(given.open(2).unwrap().device(), own.device());
     let told = given.open_another(2).unwrap_err().to_string();
     assert!(told.contains("gpu2 is the program's own device"), "{told}");
     assert!(given.open(1).unwrap_err().to_string().contains("only gpu0, gpu2"));

@@ -2,21 +2,17 @@
 
 mod common;
 
-use common::{Random, gpus, naive, naive_filtered};
+use common::{METHODS, Random, gpus, naive, naive_filtered, programs_own, with_gpus};
 use sapwise::{Aabb, Adaptive, BroadPhase, Error, Filter, Membership, PairOrder, Pairs, Reason, Registry, Tuning};
 use sapwise_gpu::kernel::Kernel;
 use sapwise_gpu::{Gpu, GpuIdentity, GpuKind, Gpus, Resident, broad_phase, wgpu30 as wgpu};
 use sapwise_scenes::Scenario;
 
-const METHODS: [&str; 4] = ["brute", "sap", "grid-sap", "bvh"];
-
 /// Opens the first GPU with buffers of at most that many bytes.
 fn small(gpus: &Gpus, bytes: u64) -> Gpu {
-    let adapter = gpus.adapter(0).unwrap();
-    let limits = wgpu::Limits { max_buffer_size: bytes, max_storage_buffer_binding_size: bytes, ..adapter.limits() };
-    let descriptor = wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() };
-    let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).unwrap();
-    Gpu::from_parts(device, queue, gpus.identities().next().unwrap().clone())
+    let limits = gpus.adapter(0).unwrap().limits();
+    let limits = wgpu::Limits { max_buffer_size: bytes, max_storage_buffer_binding_size: bytes, ..limits };
+    programs_own(gpus, 0, &wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() })
 }
 
 fn pairs_of(algorithm: &mut dyn BroadPhase, boxes: &[Aabb]) -> Result<Vec<(u32, u32)>, Error> {
@@ -60,15 +56,19 @@ fn adaptive_falls_back_in_the_frame_that_loses_a_device() {
     goes_on_without(&Gpus::of([small(&found, 128 << 20)]));
 }
 
-fn goes_on_without(gpus: &Gpus) {
-    let mut registry = Registry::with_cores(1);
-    sapwise_gpu::add_to(&mut registry, gpus);
+/// Returns an `Adaptive` that runs `grid-sap` on the first GPU, and on the CPU without it.
+fn on_first_gpu(gpus: &Gpus) -> Adaptive {
     let tuning = tuning(&[("grid-sap@gpu0", 1.0), ("sap@gpu0", 2.0), ("grid-sap@cpu1", 3.0), ("brute@cpu1", 9.0)]);
-    let mut adaptive = Adaptive::new(tuning, &registry).unwrap();
+    let mut adaptive = Adaptive::new(tuning, &with_gpus(gpus)).unwrap();
     // Without this the first frames run on the CPU, until the GPU is ready.
     adaptive.prepare(4096);
     // With learning, a software adapter soon loses to the CPU.
     adaptive.set_learning(false);
+    adaptive
+}
+
+fn goes_on_without(gpus: &Gpus) {
+    let mut adaptive = on_first_gpu(gpus);
     let mut scene = Scenario::Uniform.start(2000, 3);
     let mut chosen = Vec::new();
     for frame in 0..6 {
@@ -89,15 +89,7 @@ fn goes_on_without(gpus: &Gpus) {
 #[test]
 fn a_revived_device_is_used_at_once() {
     let Some(mut gpus) = gpus() else { return };
-    let registry = |gpus: &Gpus| {
-        let mut registry = Registry::with_cores(1);
-        sapwise_gpu::add_to(&mut registry, gpus);
-        registry
-    };
-    let tuning = tuning(&[("grid-sap@gpu0", 1.0), ("sap@gpu0", 2.0), ("grid-sap@cpu1", 3.0), ("brute@cpu1", 9.0)]);
-    let mut adaptive = Adaptive::new(tuning, &registry(&gpus)).unwrap();
-    adaptive.prepare(4096);
-    adaptive.set_learning(false);
+    let mut adaptive = on_first_gpu(&gpus);
     let mut scene = Scenario::Fragmentation.start(400, 5);
     for frame in 0..100 {
         scene.advance();
@@ -107,16 +99,12 @@ fn a_revived_device_is_used_at_once() {
         }
         if back {
             gpus = Gpus::find();
-            adaptive.revive(&registry(&gpus)).unwrap();
+            adaptive.revive(&with_gpus(&gpus)).unwrap();
         }
         assert!(pairs_of(&mut adaptive, scene.boxes()).unwrap() == naive(scene.boxes()), "frame {frame}");
         let decision = adaptive.last_decision().unwrap();
-        let present = !(7..15).contains(&(frame % 20));
-        assert_eq!(
-            decision.algorithm.to_string(),
-            if present { "grid-sap@gpu0" } else { "grid-sap@cpu1" },
-            "frame {frame}"
-        );
+        let expected = if (7..15).contains(&(frame % 20)) { "grid-sap@cpu1" } else { "grid-sap@gpu0" };
+        assert_eq!(decision.algorithm.to_string(), expected, "frame {frame}");
         assert!(!lost || decision.reason == Reason::FellBack, "frame {frame}: {:?}", decision.reason);
     }
 }
@@ -137,9 +125,7 @@ fn a_gpu_that_does_not_answer_in_time_is_lost() {
             // Clones share their GPUs.
             _ => gpus.clone().set_wait_limit(limit),
         }
-        let mut registry = Registry::with_cores(1);
-        sapwise_gpu::add_to(&mut registry, &gpus);
-        let mut algorithm = registry.create(&"brute@gpu0".parse().unwrap()).unwrap();
+        let mut algorithm = with_gpus(&gpus).create(&"brute@gpu0".parse().unwrap()).unwrap();
         // The GPU of the algorithm.
         let gpu = gpus.open(0).unwrap();
         occupy(&gpu);
@@ -186,9 +172,7 @@ fn finish(gpu: &Gpu) {
 #[test]
 fn without_its_gpu_adaptive_uses_the_cpu() {
     let tuning = tuning(&[("grid-sap@gpu0", 1.0), ("grid-sap@gpu6+7", 2.0), ("grid-sap@cpu1", 3.0)]);
-    let mut registry = Registry::with_cores(1);
-    sapwise_gpu::add_to(&mut registry, &Gpus::none());
-    let mut adaptive = Adaptive::new(tuning, &registry).unwrap();
+    let mut adaptive = Adaptive::new(tuning, &with_gpus(&Gpus::none())).unwrap();
     let boxes = Random(2).cubes(500, [9.0; 3], 0.5);
     assert!(pairs_of(&mut adaptive, &boxes).unwrap() == naive(&boxes));
     assert_eq!(adaptive.last_decision().unwrap().algorithm.to_string(), "grid-sap@cpu1");

@@ -3,16 +3,14 @@
 mod common;
 
 use common::gpu::upload;
-use common::{Random, gpus, naive, naive_filtered};
+use common::{METHODS, Random, gpus, naive, naive_filtered};
 use sapwise::error::BoxDefect;
 use sapwise::internals::Pair;
 use sapwise::{Aabb, Error, Filter, Membership};
 use sapwise_gpu::{Gpu, Resident, wgpu30 as wgpu};
 
-const METHODS: [&str; 4] = ["brute", "sap", "grid-sap", "bvh"];
-
 fn buffer(gpu: &Gpu, boxes: &[Aabb]) -> wgpu::Buffer {
-    upload(gpu.device(), gpu.queue(), boxes, wgpu::BufferUsages::STORAGE)
+    upload(gpu, boxes, wgpu::BufferUsages::STORAGE)
 }
 
 /// Downloads pairs, and sorts them.
@@ -129,7 +127,7 @@ fn wrong_input_is_an_error() {
     let gpu = gpus.open(0).unwrap();
     let mut resident = Resident::new(&gpu, "grid-sap").unwrap();
     let mut boxes = Random(5).cubes(100, [9.0; 3], 0.5);
-    let uniform = upload(gpu.device(), gpu.queue(), &boxes, wgpu::BufferUsages::UNIFORM);
+    let uniform = upload(&gpu, &boxes, wgpu::BufferUsages::UNIFORM);
     let error = resident.find_pairs(&uniform, 100).unwrap_err().to_string();
     assert!(error.contains("STORAGE"), "{error}");
     let storage = buffer(&gpu, &boxes);

@@ -22,10 +22,13 @@ pub(crate) struct Balance {
     cut_at: Option<u64>,
     /// Imbalance before the last cuts, until it is known whether they helped.
     was: Option<f64>,
-    imbalance: Option<f64>,
-    due: bool,
-    /// Whether the last frame had about as many boxes as the frame of the last cuts.
-    same_scene: bool,
+    /// The time of the slowest rank over that of equally busy ranks, minus one; `None` while times are unknown.
+    pub(crate) imbalance: Option<f64>,
+    /// Whether to cut before the next frame.
+    pub(crate) due: bool,
+    /// Whether the last frame had about as many boxes as the frame of the last cuts, so that its boxes may stand for
+    /// those of the next.
+    pub(crate) same_scene: bool,
 }
 
 impl Default for Balance {
@@ -35,21 +38,6 @@ impl Default for Balance {
 }
 
 impl Balance {
-    /// Whether to cut before the next frame.
-    pub(crate) fn is_due(&self) -> bool {
-        self.due
-    }
-
-    /// The time of the slowest rank over that of equally busy ranks, minus one; `None` while times are unknown.
-    pub(crate) fn imbalance(&self) -> Option<f64> {
-        self.imbalance
-    }
-
-    /// Whether the boxes of the last frame may stand for those of the next.
-    pub(crate) fn knows_scene(&self) -> bool {
-        self.same_scene
-    }
-
     /// Notes that space was cut. The next frame counts the boxes.
     pub(crate) fn cut(&mut self) {
         self.was = self.imbalance.take();
@@ -140,15 +128,15 @@ mod tests {
     #[test]
     fn space_is_cut_when_the_loss_pays_for_it() {
         let mut balance = Balance::default();
-        assert!(balance.is_due());
+        assert!(balance.due);
         balance.cut();
         // 100 boxes in 100 and in 300 ns: equally busy ranks take 150 ns, so a frame loses 150 ns minus 5 %.
         let frames = (0..).take_while(|_| {
             balance.observe(&frame(&[100, 300], 10_000));
-            !balance.is_due()
+            !balance.due
         });
         assert_eq!(frames.count(), (10_000.0_f64 / 142.5) as usize);
-        assert!((balance.imbalance().unwrap() - 1.0).abs() < 1e-9);
+        assert!((balance.imbalance.unwrap() - 1.0).abs() < 1e-9);
     }
 
     #[test]
@@ -157,7 +145,7 @@ mod tests {
             let mut balance = Balance::default();
             balance.cut();
             (0..10_000).for_each(|_| balance.observe(&frame(&times, 1)));
-            assert!(!balance.is_due(), "{times:?}");
+            assert!(!balance.due, "{times:?}");
         }
     }
 
@@ -168,7 +156,7 @@ mod tests {
         let mut cuts = 0;
         for _ in 0..10_000 {
             balance.observe(&frame(&[100, 300], 1000));
-            if balance.is_due() {
+            if balance.due {
                 balance.cut();
                 cuts += 1;
             }
@@ -184,12 +172,12 @@ mod tests {
         balance.cut();
         balance.observe(&of(0));
         balance.observe(&of(1));
-        assert!(balance.is_due());
+        assert!(balance.due);
         balance.cut();
         [100, 150, 200, 50].iter().for_each(|&n| balance.observe(&of(n)));
-        assert!(!balance.is_due());
+        assert!(!balance.due);
         balance.observe(&of(49));
-        assert!(balance.is_due());
+        assert!(balance.due);
     }
 
     #[test]

@@ -54,7 +54,7 @@ pub fn bisect(samples: &mut [Sample], shares: &[f64], sum: &mut dyn FnMut(&mut [
         // The parts below and above each plane.
         let mut moves = Vec::with_capacity(parts.len());
         for (part_, axis) in parts.iter().zip(axes) {
-            let plane = Plane { axis: axis as u8, at: value(part_.cuts[axis].key()) };
+            let plane = Plane { axis: axis as u8, at: value(part_.cuts[axis].plane().0) };
             planes[part_.plane] = plane;
             let half = middle(part_.first, part_.end);
             let mut enter = |child: Option<Part>| {
@@ -151,20 +151,16 @@ impl Search {
         }
     }
 
-    /// The plane as an ordered number.
-    fn key(&self) -> u64 {
-        self.found.map_or(0, |(key, _)| key)
-    }
-
-    fn below(&self) -> u64 {
-        self.found.map_or(0, |(_, below)| below)
+    /// The plane as an ordered number, and the work below it; zeros if none was found.
+    fn plane(&self) -> (u64, u64) {
+        self.found.unwrap_or_default()
     }
 }
 
 /// Chooses for each part the axis whose plane crosses the least work and comes closest to the share.
 fn axes(samples: &[Sample], parts: &[Part], sum: &mut dyn FnMut(&mut [u64])) -> Vec<usize> {
     let mut crossed = vec![0; 3 * parts.len()];
-    let planes: Vec<[f32; 3]> = parts.iter().map(|p| p.cuts.map(|cut| value(cut.key()))).collect();
+    let planes: Vec<[f32; 3]> = parts.iter().map(|p| p.cuts.map(|cut| value(cut.plane().0))).collect();
     for s in samples.iter().filter(|s| s.part != u32::MAX) {
         let part = s.part as usize;
         for a in 0..3 {
@@ -179,7 +175,7 @@ fn axes(samples: &[Sample], parts: &[Part], sum: &mut dyn FnMut(&mut [u64])) -> 
     let cost = |k: usize, a: usize| {
         let (part, cut) = (&parts[k], &parts[k].cuts[a]);
         crossed[3 * k + a]
-            .saturating_add(cut.below().abs_diff(cut.target).saturating_mul((part.end - part.first) as u64))
+            .saturating_add(cut.plane().1.abs_diff(cut.target).saturating_mul((part.end - part.first) as u64))
     };
     (0..parts.len()).map(|k| (0..3).min_by_key(|&a| cost(k, a)).unwrap_or(0)).collect()
 }
@@ -237,10 +233,8 @@ mod tests {
                 assert!(found.iter().all(|cuts| *cuts == found[0]));
                 for (count, share) in counts(&found[0], boxes).into_iter().zip(&shares) {
                     let wanted = share * boxes.len() as f64;
-                    assert!(
-                        (count as f64 - wanted).abs() < 0.01 * wanted + 4.0,
-                        "{scenario} {ranks}: {count} of {wanted}"
-                    );
+                    let off = (count as f64 - wanted).abs();
+                    assert!(off < 0.01 * wanted + 4.0, "{scenario} {ranks}: {count} of {wanted}");
                 }
             }
         }

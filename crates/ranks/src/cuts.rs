@@ -173,16 +173,13 @@ mod tests {
                 let b = Aabb::new([0, 1, 2].map(|a| p[a].min(q[a])), [0, 1, 2].map(|a| p[a].max(q[a])));
                 let mut reached = Vec::new();
                 cuts.each_rank_of(&b, |r| reached.push(r));
-                assert!(
-                    reached.is_sorted_by(|x, y| x < y) && reached.contains(&own) && reached.contains(&cuts.rank_of(q))
-                );
+                assert!(reached.is_sorted_by(|x, y| x < y), "{reached:?}");
+                assert!(reached.contains(&own) && reached.contains(&cuts.rank_of(q)), "{b:?} {reached:?}");
                 let inside = cuts.regions()[reached[0]].holds_all_of(&b);
                 assert!(!inside || reached.len() == 1, "{b:?} {reached:?}");
                 // No region is reached that the box does not touch.
-                let region = |r: &usize| cuts.regions()[*r];
-                assert!(
-                    reached.iter().map(region).all(|r| (0..3).all(|a| b.min[a] <= r.high[a] && b.max[a] >= r.low[a]))
-                );
+                let touches = |r: &Region| (0..3).all(|a| b.min[a] <= r.high[a] && b.max[a] >= r.low[a]);
+                assert!(reached.iter().all(|&r| touches(&cuts.regions()[r])), "{b:?} {reached:?}");
             }
         }
     }

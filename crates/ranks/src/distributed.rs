@@ -126,17 +126,17 @@ impl<E: Exchange> Distributed<E> {
 
     /// The time of the slowest rank over that of equally busy ranks, minus one; `None` while times are unknown.
     pub fn imbalance(&self) -> Option<f64> {
-        self.balance.imbalance()
+        self.balance.imbalance
     }
 
     /// The broad phase of this rank's region.
     pub fn adaptive(&self) -> &Adaptive {
-        self.search.adaptive()
+        &self.search.adaptive
     }
 
     /// The same, mutable: to turn learning and exploring on or off.
     pub fn adaptive_mut(&mut self) -> &mut Adaptive {
-        self.search.adaptive_mut()
+        &mut self.search.adaptive
     }
 
     /// The full error of this rank's last search, if it failed.
@@ -164,7 +164,7 @@ impl<E: Exchange> Distributed<E> {
         if self.ranks() == 1 {
             return self.find_alone(boxes, ids, pairs);
         }
-        let due = self.cut_every.map_or(self.balance.is_due(), |every| self.frames.is_multiple_of(every.max(1)));
+        let due = self.cut_every.map_or(self.balance.due, |every| self.frames.is_multiple_of(every.max(1)));
         self.frames += 1;
         if due {
             self.cut(boxes);
@@ -233,7 +233,7 @@ impl<E: Exchange> Distributed<E> {
         let times: Vec<_> = all.iter().map(|words| std::array::from_fn(|k| words[k])).collect();
         let pair_cost = all.iter().map(|words| words[FACTORS.len() + 1]).sum::<f64>() / ranks as f64;
         // The boxes of the last frame, because their pairs are known, unless the scene has changed.
-        let known = self.cuts.regions().len() == ranks && self.balance.knows_scene() && self.search.is_whole();
+        let known = self.cuts.regions().len() == ranks && self.balance.same_scene && self.search.whole;
         let mut samples = if known {
             self.search.samples(&self.cuts.regions()[self.rank()], pair_cost)
         } else {
@@ -304,7 +304,7 @@ impl<E: Exchange> Distributed<E> {
     /// Sends this record to every rank, with the number of boxes that it gets, and receives those of all ranks.
     fn exchange_records(&mut self, own: RankRecord) {
         self.outgoing.clear();
-        for &count in self.boxes_out.counts() {
+        for &count in &self.boxes_out.counts {
             self.outgoing.extend(RankRecord { sends: count as u64, ..own }.words());
         }
         self.incoming.resize(self.outgoing.len(), 0);
@@ -320,11 +320,7 @@ impl<E: Exchange> Distributed<E> {
         let (sent, report) = (self.boxes_out.len(), &mut self.report);
         (report.boxes_sent, report.boxes_received) = (sent as u64, boxes as u64);
         report.bytes_sent += (8 * BOX_WORDS * sent) as u64;
-        let send_counts: Vec<usize> = self.boxes_out.counts().iter().map(|c| c * BOX_WORDS).collect();
-        let receive_counts: Vec<usize> = counts.iter().map(|c| c * BOX_WORDS).collect();
-        self.received.resize(boxes * BOX_WORDS, 0);
-        let send = self.boxes_out.pack();
-        self.exchange.all_to_all_varcount(send, &send_counts, &mut self.received, &receive_counts);
+        self.boxes_out.exchange(&mut self.exchange, &counts, &mut self.received);
         self.search.receive(&self.received, counts.into_iter());
         self.report.boxes_searched = self.search.boxes.len() as u64;
     }
@@ -354,7 +350,7 @@ impl<E: Exchange> Distributed<E> {
     /// Sends pairs to their owners and receives those of own boxes, unless a rank failed.
     fn return_pairs(&mut self, outcome: Outcome, pairs: &mut RankPairs) -> Result<(), Error> {
         self.outgoing.clear();
-        for &count in self.pairs_out.counts() {
+        for &count in &self.pairs_out.counts {
             self.outgoing.extend([count as u64, outcome[0], outcome[1]]);
         }
         self.incoming.resize(self.outgoing.len(), 0);
@@ -363,18 +359,15 @@ impl<E: Exchange> Distributed<E> {
         if let Some(error) = answers().enumerate().find_map(|(rank, a)| error_of(rank, [a[1], a[2]])) {
             return Err(error);
         }
-        let receive_counts: Vec<usize> = answers().map(|a| a[0] as usize * PAIR_WORDS).collect();
-        let more = receive_counts.iter().sum::<usize>() / PAIR_WORDS;
+        let counts: Vec<usize> = answers().map(|a| a[0] as usize).collect();
+        let more = counts.iter().sum();
         if self.records.iter().any(|r| r.limited) {
             agree(&mut self.exchange, pairs.outcome_with(more))?;
         }
         let sent = self.pairs_out.len();
         self.report.bytes_sent += 8 * (self.outgoing.len() - ANSWER_WORDS + sent * PAIR_WORDS) as u64;
         (self.report.pairs_sent, self.report.pairs_received) = (sent as u64, more as u64);
-        let send_counts: Vec<usize> = self.pairs_out.counts().iter().map(|c| c * PAIR_WORDS).collect();
-        self.received.resize(more * PAIR_WORDS, 0);
-        let send = self.pairs_out.pack();
-        self.exchange.all_to_all_varcount(send, &send_counts, &mut self.received, &receive_counts);
+        self.pairs_out.exchange(&mut self.exchange, &counts, &mut self.received);
         pairs.extend(self.received.chunks_exact(PAIR_WORDS).map(|w| (w[0], w[1])));
         Ok(())
     }

@@ -1,11 +1,13 @@
 //! Messages to other ranks, collected in any order and packed in the order of the ranks.
 
+use crate::exchange::Exchange;
+
 /// Messages of `N` words.
 #[derive(Debug, Clone)]
 pub(crate) struct Outbox<const N: usize> {
     messages: Vec<(u32, [u64; N])>,
     /// Messages for each rank.
-    counts: Vec<usize>,
+    pub(crate) counts: Vec<usize>,
     /// Position of the next message for each rank.
     next: Vec<usize>,
     words: Vec<u64>,
@@ -27,17 +29,20 @@ impl<const N: usize> Outbox<N> {
         self.messages.push((rank as u32, message));
     }
 
-    /// Messages for each rank.
-    pub(crate) fn counts(&self) -> &[usize] {
-        &self.counts
-    }
-
     pub(crate) fn len(&self) -> usize {
         self.messages.len()
     }
 
-    /// The words of all messages by rank; those for one rank in the order of `push`.
-    pub(crate) fn pack(&mut self) -> &[u64] {
+    /// Sends the messages, and receives `counts` messages from the ranks.
+    pub(crate) fn exchange(&mut self, exchange: &mut impl Exchange, counts: &[usize], received: &mut Vec<u64>) {
+        self.pack();
+        let words = |counts: &[usize]| counts.iter().map(|count| count * N).collect::<Vec<usize>>();
+        received.resize(counts.iter().sum::<usize>() * N, 0);
+        exchange.all_to_all_varcount(&self.words, &words(&self.counts), received, &words(counts));
+    }
+
+    /// Puts the words of all messages in the order of the ranks; those for one rank in the order of `push`.
+    fn pack(&mut self) {
         self.next.clear();
         let mut at = 0;
         for count in &self.counts {
@@ -50,7 +55,6 @@ impl<const N: usize> Outbox<N> {
             self.words[*next..*next + N].copy_from_slice(message);
             *next += N;
         }
-        &self.words
     }
 
     /// Bytes of memory.
@@ -71,9 +75,9 @@ mod tests {
             for (rank, word) in [(2, 1), (0, 2), (2, 3), (0, 4)] {
                 outbox.push(rank, [word, word + 10 * round]);
             }
-            assert_eq!((outbox.counts(), outbox.len()), (&[2, 0, 2][..], 4));
-            let packed = [2, 4, 1, 3].map(|w| [w, w + 10 * round]).concat();
-            assert_eq!(outbox.pack(), packed);
+            assert_eq!((&outbox.counts[..], outbox.len()), (&[2, 0, 2][..], 4));
+            outbox.pack();
+            assert_eq!(outbox.words, [2, 4, 1, 3].map(|w| [w, w + 10 * round]).concat());
         }
     }
 }

@@ -28,7 +28,7 @@ fn of_words(w: &[u64]) -> (Aabb, u64) {
 
 /// Searches the boxes of a region.
 pub(crate) struct LocalSearch {
-    adaptive: Adaptive,
+    pub(crate) adaptive: Adaptive,
     /// Own boxes first, then those of each rank in turn.
     pub(crate) boxes: Vec<Aabb>,
     /// The ids of these boxes.
@@ -37,8 +37,8 @@ pub(crate) struct LocalSearch {
     ends: Vec<usize>,
     pub(crate) found: Pairs,
     pub(crate) times: Times,
-    /// Whether `found` holds the pairs of `boxes`.
-    whole: bool,
+    /// Whether `found` holds the pairs of `boxes`: the last search succeeded, and its boxes are still here.
+    pub(crate) whole: bool,
     /// The error of the last search.
     pub(crate) error: Option<Error>,
 }
@@ -62,11 +62,6 @@ impl LocalSearch {
         self.ids.clear();
         self.ends.clear();
         self.whole = false;
-    }
-
-    /// Whether the last search succeeded and its boxes are still here.
-    pub(crate) fn is_whole(&self) -> bool {
-        self.whole
     }
 
     #[inline]
@@ -120,14 +115,6 @@ impl LocalSearch {
         let result = self.adaptive.find_pairs(boxes, &mut self.found);
         self.error = result.clone().err();
         result
-    }
-
-    pub(crate) fn adaptive(&self) -> &Adaptive {
-        &self.adaptive
-    }
-
-    pub(crate) fn adaptive_mut(&mut self) -> &mut Adaptive {
-        &mut self.adaptive
     }
 
     /// The load of the last search.

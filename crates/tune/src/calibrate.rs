@@ -104,7 +104,7 @@ fn arrival(found: Option<Found>, registry: &Registry, remarks: Vec<String>) -> A
         return (start, None);
     }
     start.setup.origin = origin;
-    start.setup.file = file.as_ref().filter(|_| sound).map(|file| file.path().to_owned());
+    start.setup.file = file.as_ref().filter(|_| sound).map(|file| file.path.clone());
     start.save = file.map(|file| {
         let write =
             move |learned: &Tuning| if sound { file.write(learned, measured).map(|()| true) } else { Ok(false) };
@@ -230,7 +230,7 @@ mod tests {
         let (registry, folder) = (Registry::with_cores(1), tempfile::tempdir().unwrap());
         for sound in [false, true] {
             let file = CacheFile::new(folder.path(), &registry);
-            let (tuning, path) = (Tuning::usual(&registry), file.path().to_owned());
+            let (tuning, path) = (Tuning::usual(&registry), file.path.clone());
             let file = Some(file);
             let found = Found { tuning, origin: Origin::Probed, measured: SystemTime::now(), file, sound };
             let (start, tuning) = arrival(Some(found), &registry, Vec::new());

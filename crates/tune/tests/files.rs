@@ -1,7 +1,7 @@
 //! The built-in model is current, stored files stay readable, and damaged and old files are refused.
 
 use sapwise::Registry;
-use sapwise::algorithm::{BackendClass, Load};
+use sapwise::algorithm::{BackendClass, Entry, Load};
 use sapwise_tune::{Hardware, Machine, Model, Parameter, ParameterId, json};
 use serde_json::Value;
 use std::sync::Arc;
@@ -9,22 +9,16 @@ use std::sync::Arc;
 #[test]
 fn the_built_in_model_knows_every_method_of_this_build() {
     let model = Model::built_in().unwrap();
-    for entry in Registry::with_cores(1).entries().iter().filter(|e| e.id.backend().class() == BackendClass::Cpu) {
-        assert_eq!(
-            model.method(&entry.id).map(|m| m.revision),
-            Some(entry.revision),
-            "{}: train on new reports",
-            entry.id
-        );
-    }
+    let mut entries = Registry::with_cores(1).entries().to_vec();
+    entries.retain(|e| e.id.backend().class() == BackendClass::Cpu);
     #[cfg(feature = "gpu")]
     {
-        use sapwise::algorithm::Entry;
         use sapwise_tune::{GpuIdentity, GpuKind};
         let gpus = [0, 1].map(|index| GpuIdentity::new(index, "made up", GpuKind::Software));
-        for Entry { id, revision, .. } in sapwise_gpu::algorithms(&gpus) {
-            assert_eq!(model.method(&id).map(|m| m.revision), Some(revision), "{id}: train on new reports");
-        }
+        entries.extend(sapwise_gpu::algorithms(&gpus));
+    }
+    for Entry { id, revision, .. } in entries {
+        assert_eq!(model.method(&id).map(|m| m.revision), Some(revision), "{id}: train on new reports");
     }
 }
 
@@ -45,16 +39,20 @@ fn every_schema_version_stays_readable() {
 fn damaged_files_are_refused_with_the_place() {
     let whole = include_str!("../../../models/default.json");
     json::model(whole).unwrap();
-    let refused = |text: &str| json::model(text).unwrap_err().to_string();
-    assert!(refused(&whole[..whole.len() / 2]).contains("line"));
-    assert!(refused("").contains("line"));
-    assert!(refused(&whole.replace("model/5", "model/9")).contains("model/9"));
-    assert!(refused(&whole.replacen("\"method\"", "\"methode\"", 1)).contains("methods[0]"));
-    assert!(refused(&whole.replacen("\"unit\": ", "\"unit\": -", 1)).contains("unit"));
-    // Found by the fuzz target `files`: its costs were no numbers.
-    assert!(refused(&whole.replacen("\"axis_candidates\": ", "\"axis_candidates\": -", 1)).contains("places[0]"));
     let nested = format!("{{\"schema\": \"model/5\", \"name\": {}{}}}", "[".repeat(10_000), "]".repeat(10_000));
-    assert!(!refused(&nested).is_empty());
+    for (damaged, place) in [
+        (&whole[..whole.len() / 2], "line"),
+        ("", "line"),
+        (&whole.replace("model/5", "model/9"), "model/9"),
+        (&whole.replacen("\"method\"", "\"methode\"", 1), "methods[0]"),
+        (&whole.replacen("\"unit\": ", "\"unit\": -", 1), "unit"),
+        // Found by the fuzz target `files`: its costs were no numbers.
+        (&whole.replacen("\"axis_candidates\": ", "\"axis_candidates\": -", 1), "places[0]"),
+        (&nested, ""),
+    ] {
+        let error = json::model(damaged).unwrap_err().to_string();
+        assert!(!error.is_empty() && error.contains(place), "{place}: {error}");
+    }
 }
 
 /// A prediction of the built-in model for a machine of two cores, as a file.
@@ -89,32 +87,28 @@ fn works_are_written_once_and_shared_again() {
 
 #[test]
 fn impossible_tunings_are_refused_by_name() {
-    let refused = |change: &dyn Fn(&mut Value)| {
+    let refused = |text: &str, change: &dyn Fn(&mut Value)| {
         let mut file = tuning_file();
         change(&mut file);
-        json::tuning(&file.to_string()).unwrap_err().to_string()
+        let error = json::tuning(&file.to_string()).unwrap_err().to_string();
+        assert!(error.contains(text), "{text}: {error}");
+        error
     };
-    let cut = refused(&|f| f["works"].as_array_mut().unwrap().truncate(1));
-    assert!(cut.contains("there is no work") && cut.contains("@cpu"), "{cut}");
-    let places = refused(&|f| f["places"].as_array_mut().unwrap().truncate(3));
-    assert!(places.contains("more weights than places"), "{places}");
-    let huge = refused(&|f| f["works"][0]["residual"][0] = 1e300.into());
-    assert!(huge.contains("impossible weight"), "{huge}");
-    let repeated = refused(&|f| {
+    let cut = refused("there is no work", &|f| f["works"].as_array_mut().unwrap().truncate(1));
+    assert!(cut.contains("@cpu"), "{cut}");
+    refused("more weights than places", &|f| f["places"].as_array_mut().unwrap().truncate(3));
+    refused("impossible weight", &|f| f["works"][0]["residual"][0] = 1e300.into());
+    refused("stands there twice", &|f| {
         let first = f["costs"][0].clone();
         f["costs"].as_array_mut().unwrap().push(first);
     });
-    assert!(repeated.contains("stands there twice"), "{repeated}");
-    let itself = refused(&|f| {
+    refused("does not stand before it", &|f| {
         let last = f["works"].as_array().unwrap().len() - 1;
         f["works"][last]["fallback"] = serde_json::json!({ "work": last, "factor": 1.0 });
     });
-    assert!(itself.contains("does not stand before it"), "{itself}");
-    let threads = refused(&|f| {
-        let none = serde_json::json!({
+    refused("helpers have fewer than two threads", &|f| {
+        f["costs"][0]["helpers"] = serde_json::json!({
             "threads": 1, "call_ns": 0.0, "late_ns": 0.0, "speed_up": 1.0, "boxes_per_thread": 0
         });
-        f["costs"][0]["helpers"] = none;
     });
-    assert!(threads.contains("helpers have fewer than two threads"), "{threads}");
 }

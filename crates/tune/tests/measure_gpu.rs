@@ -6,8 +6,8 @@
 mod common;
 mod rules;
 
-use common::gpus;
-use sapwise_gpu::{Gpu, Gpus, wgpu30 as wgpu};
+use common::{gpus, programs_own};
+use sapwise_gpu::{Gpus, wgpu30 as wgpu};
 use sapwise_tune::hardware::GpuParameterId;
 use sapwise_tune::measure::{self, Options};
 use sapwise_tune::{GpuKind, Parameter};
@@ -70,10 +70,7 @@ fn a_gpu_that_is_not_there() {
 #[test]
 fn a_given_gpu_is_measured_on_its_own_device() {
     let Some(gpus) = gpus() else { return };
-    let opened = gpus.adapter(0).unwrap().request_device(&wgpu::DeviceDescriptor::default());
-    let (device, queue) = pollster::block_on(opened).unwrap();
-    let identity = sapwise_gpu::identity(0, &device.adapter_info());
-    let given = Gpus::of([Gpu::from_parts(device, queue, identity)]);
+    let given = Gpus::of([programs_own(&gpus, 0, &wgpu::DeviceDescriptor::default())]);
     let options = Options::default().with_limit(std::time::Duration::ZERO);
     let measured = measure::gpu(&given, 0, &options).unwrap();
     assert_eq!(measured.parameters.iter().map(|p| p.name.clone()).collect::<Vec<_>>(), GpuParameterId::OF_ONE);

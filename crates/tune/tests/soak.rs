@@ -235,9 +235,8 @@ fn live_bytes(lowest: isize) -> isize {
 
 #[test]
 fn failures_lose_no_pair_and_leak_no_memory() {
-    let told = std::env::var("SAPWISE_SOAK_FRAMES")
-        .map(|text| text.parse().expect("SAPWISE_SOAK_FRAMES is a number of frames"));
-    let frames: u64 = told.unwrap_or(FRAMES);
+    let told = std::env::var("SAPWISE_SOAK_FRAMES");
+    let frames: u64 = told.map_or(FRAMES, |text| text.parse().expect("SAPWISE_SOAK_FRAMES is a number of frames"));
     let began = Instant::now();
     let mut random = Random(0x5eed_50a4);
     let mut tally = Tally::default();
@@ -261,13 +260,9 @@ fn failures_lose_no_pair_and_leak_no_memory() {
     let (early, late) = (&live[live.len() / 4..live.len() / 2], &live[live.len() * 3 / 4..]);
     let least = |bytes: &[isize]| bytes.iter().copied().min().unwrap();
     let seconds = began.elapsed().as_secs_f64();
-    println!("{tally:#?}\n{seconds:.1} s, {} bytes in use early on, {} at the end", least(early), least(late));
-    assert!(
-        least(late) <= least(early) + SLACK_BYTES,
-        "{} bytes in use early on, {} at the end",
-        least(early),
-        least(late)
-    );
+    let (early, late) = (least(early), least(late));
+    println!("{tally:#?}\n{seconds:.1} s, {early} bytes in use early on, {late} at the end");
+    assert!(late <= early + SLACK_BYTES, "{early} bytes in use early on, {late} at the end");
     for (what, times) in [
         ("a GPU was lost", tally.gpus_lost),
         ("it was lost in a frame of its own", tally.fell_back),

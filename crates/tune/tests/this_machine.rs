@@ -295,15 +295,12 @@ fn a_program_without_a_registry_gets_our_algorithms() {
 #[test]
 fn a_program_brings_its_pool_and_its_gpu() {
     use sapwise::rayon1 as rayon;
-    use sapwise_gpu::{Gpu, Gpus, wgpu30 as wgpu};
+    use sapwise_gpu::{Gpus, wgpu30 as wgpu};
     let Some(gpus) = common::gpus() else { return };
     let folder = tempfile::tempdir().unwrap();
-    let opened = gpus.adapter(0).unwrap().request_device(&wgpu::DeviceDescriptor::default());
-    let (device, queue) = pollster::block_on(opened).unwrap();
-    let identity = sapwise_gpu::identity(0, &device.adapter_info());
-    let mut registry = Registry::with_cores(1);
+    let own = common::programs_own(&gpus, 0, &wgpu::DeviceDescriptor::default());
+    let mut registry = common::with_gpus(&Gpus::of([own]));
     registry.use_pool(Arc::new(rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap()));
-    sapwise_gpu::add_to(&mut registry, &Gpus::of([Gpu::from_parts(device, queue, identity)]));
     let options = options(folder.path()).background(true).registry(Arc::new(registry));
     let mut first = start(&options);
     frames_until_it_came(&mut first);

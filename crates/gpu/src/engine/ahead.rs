@@ -48,11 +48,6 @@ impl Engine {
         Ok(Some((header, Look::at(&self.sampled()?))))
     }
 
-    /// Returns the buffer of the [`Header`], which the program's kernels may read.
-    pub(crate) fn header_buffer(&self) -> &wgpu::Buffer {
-        self.header.buffer()
-    }
-
     /// Submits a frame without boxes.
     pub(crate) fn submit_nothing(&self) -> Result<(), GpuError> {
         let encoder = self.gpu.record();

@@ -38,7 +38,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Waits for the frame. Returns the number of pairs, all of which are in [`pairs_buffer`](Self::pairs_buffer),
+    /// Waits for the frame. Returns the number of pairs, all of which are in [`Output::pairs`](crate::Output),
     /// and a sample of the boxes.
     pub(crate) async fn finish_resident(&mut self) -> Result<(u32, SampledBoxes), Failure> {
         let mut all = 0_u64;
@@ -80,11 +80,6 @@ impl Engine {
         }
         frame.params.capacity = self.output.capacity();
         Ok(())
-    }
-
-    /// Returns the list of pairs of the previous frame.
-    pub(crate) fn pairs_buffer(&self) -> &wgpu::Buffer {
-        self.output.pairs()
     }
 
     fn too_many(&self, pairs: u64, hint: &str) -> Failure {

@@ -1,7 +1,11 @@
+#[path = "../../../../tests/common/mod.rs"]
+mod common;
+
 use super::{Engine, Pending};
 use crate::kernel::dispatched;
 use crate::{Failure, Gpus, Header, Look, Output, Params, Storage, first_for_tests};
 use bytemuck::{bytes_of, cast_slice};
+use common::naive;
 use pollster::block_on;
 use sapwise::algorithm::FramePlan;
 use sapwise::error::GpuErrorKind;
@@ -26,15 +30,6 @@ fn row() -> Vec<Aabb> {
     (0..300).map(|k| Aabb::cube([k as f32, 0.0, 0.0], 0.6)).collect()
 }
 
-fn oracle(boxes: &[Aabb]) -> Vec<(u32, u32)> {
-    let mut pairs = Vec::new();
-    for j in 0..boxes.len() {
-        pairs.extend((0..j).filter(|&i| boxes[i].overlaps(&boxes[j])).map(|i| (i as u32, j as u32)));
-    }
-    pairs.sort_unstable();
-    pairs
-}
-
 fn plan(engine: &Engine, boxes: &[Aabb]) -> Params {
     engine.plan(boxes.len() as u32, || Look::at(&SampledBoxes::from(boxes)))
 }
@@ -56,7 +51,7 @@ fn assert_inert(found: Result<usize, Failure>) {
 fn rows_go_on_after_their_budget() {
     let gpus = Gpus::find();
     let boxes = crowded();
-    let expected = oracle(&boxes);
+    let expected = naive(&boxes);
     for index in 0..gpus.len() as u32 {
         for method in SORTING {
             let mut engine = Engine::new(gpus.open(index).unwrap(), method).unwrap();
@@ -76,7 +71,7 @@ fn rows_go_on_after_their_budget() {
 fn resident_pairs_of_several_submissions_are_contiguous() {
     let Some(gpu) = first_for_tests() else { return };
     let boxes = crowded();
-    let expected = oracle(&boxes);
+    let expected = naive(&boxes);
     let contents = cast_slice(&boxes);
     let usage = wgpu::BufferUsages::STORAGE;
     let buffer = gpu.device().create_buffer_init(&wgpu::util::BufferInitDescriptor { label: None, contents, usage });
@@ -96,7 +91,7 @@ fn resident_pairs_of_several_submissions_are_contiguous() {
 
 /// Returns the pairs that stayed on the GPU, sorted.
 fn pairs_on_cpu(engine: &Engine, count: u32) -> Vec<(u32, u32)> {
-    let list = engine.gpu.read_words(engine.pairs_buffer(), 2 * u64::from(count)).unwrap();
+    let list = engine.gpu.read_words(engine.output.pairs(), 2 * u64::from(count)).unwrap();
     let mut pairs: Vec<(u32, u32)> = list.chunks(2).map(|pair| (pair[0], pair[1])).collect();
     pairs.sort_unstable();
     pairs

@@ -58,12 +58,17 @@ const SPEED: f32 = 0.1;
 /// Share of the velocity of a cube that its pieces keep.
 const INHERITED: f32 = 0.5;
 
+#[derive(Debug, Clone, Copy)]
+struct Cube {
+    centre: [f32; 3],
+    half: f32,
+    velocity: [f32; 3],
+}
+
 /// Cubes of any size whose volumes add up to about the same, however many there are.
 #[derive(Debug, Clone)]
 pub(super) struct Fragmentation {
-    centres: Vec<[f32; 3]>,
-    halves: Vec<f32>,
-    velocities: Vec<[f32; 3]>,
+    cubes: Vec<Cube>,
     wall: f32,
     start: usize,
     peak: usize,
@@ -80,9 +85,7 @@ impl Fragmentation {
     pub(super) fn new(peak: usize) -> Self {
         let start = START.min(peak);
         Self {
-            centres: Vec::with_capacity(peak),
-            halves: Vec::with_capacity(peak),
-            velocities: Vec::with_capacity(peak),
+            cubes: Vec::with_capacity(peak),
             wall: (cube_root(VOLUME * peak as f64) * 0.5) as f32,
             start,
             peak,
@@ -99,18 +102,16 @@ impl Fragmentation {
         if frame == 0 {
             self.begin(rng);
         }
-        for (centre, velocity) in self.centres.iter_mut().zip(&mut self.velocities) {
-            fly(centre, velocity, self.wall);
-        }
+        self.cubes.iter_mut().for_each(|cube| fly(&mut cube.centre, &mut cube.velocity, self.wall));
         let target = self.target(frame);
-        while self.centres.len() < target {
-            self.split((target - self.centres.len() + 1).min(8), rng);
+        while self.cubes.len() < target {
+            self.split((target - self.cubes.len() + 1).min(8), rng);
         }
-        while self.centres.len() > target {
-            self.merge((self.centres.len() - target).min(7));
+        while self.cubes.len() > target {
+            self.merge((self.cubes.len() - target).min(7));
         }
         boxes.clear();
-        boxes.extend(self.centres.iter().zip(&self.halves).map(|(&centre, &half)| Aabb::cube(centre, half)));
+        boxes.extend(self.cubes.iter().map(|cube| Aabb::cube(cube.centre, cube.half)));
     }
 
     /// How many cubes there are in a frame of the cycle.
@@ -124,52 +125,41 @@ impl Fragmentation {
 
     /// Places the first cubes. Each cycle does so anew, so that rounding in volumes and velocities never adds up.
     fn begin(&mut self, rng: &mut Rng) {
-        self.centres.clear();
-        self.halves.clear();
-        self.velocities.clear();
+        self.cubes.clear();
         self.cursor = 0;
         let half = (0.5 * cube_root(self.peak as f64 / self.start.max(1) as f64)) as f32;
         for _ in 0..self.start {
-            self.centres.push(rng.signed3().map(|u| u * self.wall));
+            let centre = rng.signed3().map(|u| u * self.wall);
             let half = half * (0.8 + 0.4 * rng.unit());
-            self.halves.push(half);
-            self.velocities.push(rng.signed3().map(|u| u * half * SPEED));
+            self.cubes.push(Cube { centre, half, velocity: rng.signed3().map(|u| u * half * SPEED) });
         }
     }
 
     /// Shatters the next cube into `pieces`, 2 to 8, that have its volume and fly apart along its diagonals.
     fn split(&mut self, pieces: usize, rng: &mut Rng) {
-        let at = self.next(self.centres.len());
-        let (centre, parent, velocity) = (self.centres[at], self.halves[at], self.velocities[at]);
-        let half = parent * self.edges[pieces];
-        for piece in 0..pieces {
+        let at = self.next(self.cubes.len());
+        let parent = self.cubes[at];
+        let half = parent.half * self.edges[pieces];
+        for k in 0..pieces {
             let jitter = rng.signed3();
-            let (mut place, mut speed) = ([0.0; 3], [0.0; 3]);
+            let mut piece = Cube { half, ..parent };
             for a in 0..3 {
-                let side = if piece >> a & 1 == 1 { 1.0 } else { -1.0 };
-                let away = centre[a] + side * parent * 0.5 * (1.0 + GAP) + jitter[a] * half * JITTER;
-                place[a] = reflect(away, self.wall);
-                speed[a] = INHERITED * velocity[a] + side * half * SPEED * (1.5 + 0.5 * jitter[a]);
+                let side = if k >> a & 1 == 1 { 1.0 } else { -1.0 };
+                let away = parent.centre[a] + side * parent.half * 0.5 * (1.0 + GAP) + jitter[a] * half * JITTER;
+                piece.centre[a] = reflect(away, self.wall);
+                piece.velocity[a] = INHERITED * parent.velocity[a] + side * half * SPEED * (1.5 + 0.5 * jitter[a]);
             }
-            if piece == 0 {
-                (self.centres[at], self.halves[at], self.velocities[at]) = (place, half, speed);
-            } else {
-                self.centres.push(place);
-                self.halves.push(half);
-                self.velocities.push(speed);
-            }
+            if k == 0 { self.cubes[at] = piece } else { self.cubes.push(piece) }
         }
     }
 
     /// Deletes the last `pieces` cubes, 1 to 7, and grows the next one by their volume.
     fn merge(&mut self, pieces: usize) {
-        let left = self.centres.len() - pieces;
+        let left = self.cubes.len() - pieces;
         let at = self.next(left);
-        let cube = |half: f32| f64::from(half) * f64::from(half) * f64::from(half);
-        let volume: f64 = self.halves.drain(left..).map(cube).sum();
-        self.halves[at] = cube_root(volume + cube(self.halves[at])) as f32;
-        self.centres.truncate(left);
-        self.velocities.truncate(left);
+        let volume = |Cube { half, .. }: Cube| f64::from(half) * f64::from(half) * f64::from(half);
+        let removed: f64 = self.cubes.drain(left..).map(volume).sum();
+        self.cubes[at].half = cube_root(removed + volume(self.cubes[at])) as f32;
     }
 
     /// The index at the cursor, which goes round the first `objects`, and moves the cursor on.

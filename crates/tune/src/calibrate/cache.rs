@@ -16,16 +16,12 @@ use std::time::SystemTime;
 /// The file for this machine, this build and these algorithms.
 #[derive(Debug, Clone)]
 pub(super) struct CacheFile {
-    path: PathBuf,
+    pub(super) path: PathBuf,
 }
 
 impl CacheFile {
     pub(super) fn new(folder: &Path, registry: &Registry) -> Self {
         Self { path: folder.join(format!("tuning-{:016x}.json", fnv1a(&key(registry)))) }
-    }
-
-    pub(super) fn path(&self) -> &Path {
-        &self.path
     }
 
     /// Returns the tuning and when its hardware was measured; `None` if there is no file.
@@ -94,6 +90,7 @@ fn gpus(_: &Registry) -> Vec<GpuIdentity> {
 mod tests {
     use super::*;
     use sapwise::AlgorithmId;
+    use sapwise::algorithm::SimdLevel;
     use sapwise::tuning::Step;
     use std::collections::BTreeSet;
 
@@ -118,13 +115,13 @@ mod tests {
         let file = file(folder.path());
         let whole = json::write_tuning(&tuning(1)).unwrap();
         for text in ["", &whole[..whole.len() / 2], &whole.replacen("\"from_objects\": 0", "\"from_objects\": 7", 1)] {
-            fs::write(file.path(), text).unwrap();
+            fs::write(&file.path, text).unwrap();
             assert!(file.read().unwrap_err().contains("is ignored"));
             file.write(&tuning(2), SystemTime::now()).unwrap();
             assert_eq!(file.read().unwrap().unwrap().0, tuning(2));
         }
-        fs::remove_file(file.path()).unwrap();
-        fs::create_dir_all(file.path().join("inside")).unwrap();
+        fs::remove_file(&file.path).unwrap();
+        fs::create_dir_all(file.path.join("inside")).unwrap();
         assert!(file.read().is_err() && file.write(&tuning(1), SystemTime::now()).is_err());
         assert_eq!(names(folder.path()).len(), 1);
     }
@@ -135,8 +132,8 @@ mod tests {
         let mut names = vec![key(&registry), key(&Registry::with_cores(1))];
         registry.add(AlgorithmId::cpu("brute", 1), 99, || unreachable!("nothing runs"));
         names.push(key(&registry));
-        if sapwise::algorithm::SimdLevel::in_use() > sapwise::algorithm::SimdLevel::Portable {
-            registry.limit_simd(sapwise::algorithm::SimdLevel::Portable);
+        if SimdLevel::in_use() > SimdLevel::Portable {
+            registry.limit_simd(SimdLevel::Portable);
             names.push(key(&registry));
         }
         assert_eq!(names.iter().collect::<BTreeSet<_>>().len(), names.len());

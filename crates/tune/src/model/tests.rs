@@ -96,10 +96,10 @@ fn several_gpus_have_the_slowest_latency_and_limited_rates() {
 #[test]
 fn scales_and_helpers_of_the_other_processor_are_refused() {
     let h = hardware();
-    assert!(Scale::Lane.nanoseconds(&h, &Backend::Gpu(vec![0])).unwrap_err().to_string().contains("gpu0 has no scale"));
-    assert!(
-        Scale::GpuDispatch.nanoseconds(&h, &Backend::Cpu(2)).unwrap_err().to_string().contains("cpu2 has no scale")
-    );
+    for (scale, backend) in [(Scale::Lane, Backend::Gpu(vec![0])), (Scale::GpuDispatch, Backend::Cpu(2))] {
+        let error = scale.nanoseconds(&h, &backend).unwrap_err().to_string();
+        assert!(error.contains(&format!("{backend} has no scale")), "{error}");
+    }
     let wrong = model(vec![method(BackendClass::Cpu, Scale::GpuDispatch)]);
     assert!(wrong.defect().unwrap().contains("gpu_dispatch"));
     let helped = MethodModel {

@@ -71,10 +71,8 @@ fn values_that_no_machine_has_are_refused_by_name() {
         (ParameterId::ScalingTwoThreadsRatio, &[190.0]),
     ] {
         for &value in values {
-            let error = both()
-                .predict(&machine(&[(name, value)]), &ids(&["brute@cpu1", "brute@gpu0"]))
-                .unwrap_err()
-                .to_string();
+            let prediction = both().predict(&machine(&[(name, value)]), &ids(&["brute@cpu1", "brute@gpu0"]));
+            let error = prediction.unwrap_err().to_string();
             assert!(error.contains(name.as_str()) && error.contains("check its unit"), "{value}: {error}");
         }
     }
