@@ -189,11 +189,9 @@ fn on_gpus(registry: &Registry) -> Result<Vec<AlgorithmId>, String> {
     let entries = registry.entries().iter().filter(|e| matches!(e.id.backend(), Backend::Gpu(_)));
     let known: Vec<AlgorithmId> = entries.map(|e| e.id.clone()).collect();
     let Ok(named) = std::env::var("SAPWISE_GPUS") else { return Ok(known) };
-    let backends =
-        named.split(',').map(|text| text.trim().parse::<Backend>().map_err(|e| format!("SAPWISE_GPUS: {e}")));
     let mut wanted = Vec::new();
-    for backend in backends {
-        let backend = backend?;
+    for text in named.split(',') {
+        let backend: Backend = text.trim().parse().map_err(|e| format!("SAPWISE_GPUS: {e}"))?;
         let before = wanted.len();
         wanted.extend(known.iter().filter(|id| *id.backend() == backend).cloned());
         if wanted.len() == before {
@@ -323,11 +321,10 @@ fn bench() -> Result<Vec<String>, String> {
     let mut remarks = Vec::new();
     let mut cpu = vec![1, usable_cores()];
     cpu.dedup();
-    let cpu = cpu.into_iter().map(|k| AlgorithmId::new("grid-sap", Backend::Cpu(k)).map_err(|e| e.to_string()));
+    let cpu = cpu.into_iter().map(|k| AlgorithmId::cpu("grid-sap", k));
     let mut contestants = Vec::new();
     let busy = Busy::default();
-    for id in cpu.chain(on_gpus(&registry)?.into_iter().map(Ok)) {
-        let id = id?;
+    for id in cpu.chain(on_gpus(&registry)?) {
         match registry.create(&id) {
             Ok(algorithm) => {
                 contestants.push(Contestant::new(id.clone(), "host", host_resident(algorithm, busy.of(id.backend()))));

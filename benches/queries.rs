@@ -1,7 +1,7 @@
 //! Queries of a tree beside those of parry3d and obvhs, on one thread: rays, first hit and all hits, and regions.
 //!
-//! Reports the CPU time of a query in nanoseconds: the median of interleaved rounds. First of all, every contestant
-//! must find the same.
+//! Reports the CPU time of a query in nanoseconds: the median of interleaved rounds. Before, it asserts that all
+//! contestants find the same.
 
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb as Bounds;
@@ -147,7 +147,7 @@ fn peer_ray(ray: &Ray) -> PeerRay {
     PeerRay::new_inf(ray.origin.into(), ray.direction.into())
 }
 
-/// Both trees have these functions, without a common trait.
+/// The methods for rays. Both trees have the functions that they call, but no common trait.
 macro_rules! rays {
     () => {
         fn name(&self) -> &'static str {
@@ -209,7 +209,7 @@ fn contestants(boxes: &[Aabb]) -> Vec<Box<dyn Contestant>> {
     let parry = boxes.iter().map(|b| ParryBounds::new(b.min.into(), b.max.into())).enumerate();
     let parry = Parry { tree: Bvh::from_iter(BvhBuildStrategy::Binned, parry), bounds: bounds.clone() };
     let mut taken = Duration::ZERO;
-    // The best trees of obvhs; those with one box a leaf too.
+    // The best trees of obvhs, with up to eight boxes a leaf and with one.
     let best = BvhBuildParams::very_slow_build();
     let few = build_bvh2(&bounds, best, &mut taken);
     let one = build_bvh2(&bounds, BvhBuildParams { max_prims_per_leaf: 1, ..best }, &mut taken);

@@ -7,7 +7,7 @@ use sapwise::{Aabb, Adaptive, Body, BroadPhase, Changes, Filter, Membership, Pai
 use sapwise_scenes::{Random, Scenario};
 use std::time::Instant;
 
-/// Frames before the first that counts: bodies rest by then, and margins have settled.
+/// Warm-up frames: after them bodies rest and margins have settled.
 const WARM_UP: usize = 100;
 
 fn adaptive() -> Adaptive {
@@ -40,12 +40,12 @@ fn row(name: &str, mut space: Times, mut other: Times) {
     println!("| {name} | {} | {median:.1} | {slow:.1} | {beside:.1} | {:.2} |", space.0.len(), median / beside);
 }
 
-/// Frames for a scene of this size: about as long for each.
+/// Returns the number of frames for a scene of this size, so that all scenes take about the same time.
 fn frames(objects: usize) -> usize {
     WARM_UP + (2_000_000 / objects).clamp(60, 2000)
 }
 
-/// All bodies move; the slice interface with filter, ids and events does the same.
+/// All bodies move, compared with the slice interface with filter, ids and events.
 fn all_moving(scenario: Scenario, objects: usize) {
     let mut scene = scenario.start(objects, 1);
     let mut space = Space::with(adaptive());
@@ -77,7 +77,7 @@ fn all_moving(scenario: Scenario, objects: usize) {
     row(&format!("{scenario} {objects}: slice interface"), one, other);
 }
 
-/// A few of many bodies are set; in the other space there are no others.
+/// A few of many bodies are set, compared with a space that has only these few.
 fn few_of_many(objects: usize, set: usize) {
     let mut scene = Scenario::Uniform.start(objects, 1);
     let (mut many, mut few) = (Space::with(adaptive()), Space::with(adaptive()));
@@ -106,7 +106,7 @@ fn few_of_many(objects: usize, set: usize) {
     row(&format!("{set} of {objects} set: those alone"), one, other);
 }
 
-/// All bodies move and one in a hundred is replaced in each frame; in the other space none is.
+/// All bodies move and one in a hundred is replaced in each frame, compared with a space in which none is replaced.
 fn churn(objects: usize) {
     let mut scene = Scenario::Uniform.start(objects, 1);
     let (mut space, mut steady) = (Space::with(adaptive()), Space::with(adaptive()));

@@ -163,7 +163,7 @@ fn output_is_the_same_whatever_ran() {
             assert!(a == b, "{course:?}, frame {frame}");
         }
     }
-    // In any order the pairs may stand elsewhere, but the lists of ids may not.
+    // Without canonical order the pairs may come in another order, but not the lists of ids.
     for (frame, (a, b)) in first.0.iter().zip(run(PairOrder::Any, courses[2]).0).enumerate() {
         assert!((&a.begun, &a.ended, &a.all) == (&b.begun, &b.ended, &b.all), "in any order, frame {frame}");
     }

@@ -141,10 +141,10 @@ fn clone_has_the_registry_the_tuning_and_what_was_learned() {
     let mut twin = space.clone();
     assert_eq!(twin.search().tuning(), space.search().tuning());
     assert_eq!(twin.search().learned().costs, space.search().learned().costs);
-    // Its first frame is by the number of objects, as every first one of few boxes.
+    // In its first frame it chooses by the number of objects, as it always does in a first frame of few boxes.
     ran(&mut twin);
     assert_eq!(ran(&mut twin), "quick@cpu1");
-    // Where nothing can be made any more, a frame says so.
+    // If the algorithm can't be made again, a frame reports that.
     let mut failing = Registry::with_cores(1);
     let made = std::sync::atomic::AtomicBool::new(false);
     failing.add("once@cpu1".parse().unwrap(), 1, move || {

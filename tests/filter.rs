@@ -104,7 +104,7 @@ fn fixed_boxes_are_freed_while_pairs_are_kept() {
         (0..1000).map(|k| Membership { fixed: fixed(k), ..Membership::ALL }).collect()
     };
     let mut algorithms = every_algorithm();
-    // Each for some frames: a ground, one of its boxes free, all free, all fixed, all but one fixed.
+    // Some frames of each: a ground, one of its boxes free, all free, all fixed, all but one fixed.
     for (stage, memberships) in
         [all(&|k| k % 10 != 0), all(&|k| k % 10 != 0 && k != 77), Vec::new(), all(&|_| true), all(&|k| k != 500)]
             .into_iter()
@@ -144,8 +144,8 @@ fn few_memberships_change_while_nothing_moves() {
     }
 }
 
-/// Returns whether a method rules out every unwanted pair before it finds it, and how many boxes it can take in a scene
-/// in which all overlap.
+/// Returns whether a method rules out every unwanted pair before it finds it, and how many boxes it can take in a
+/// scene in which all overlap.
 fn kind_of(id: &str) -> (bool, usize) {
     let method = id.split('@').next().unwrap();
     (["bvh", "pair-cache"].contains(&method), if ["brute", "sap"].contains(&method) { 1500 } else { 20_000 })
@@ -200,7 +200,7 @@ fn bodies_are_not_searched_within() {
             let corner = [body / 16, body / 4 % 4, body % 4].map(|at| at as f32 * 4.0);
             boxes.extend((0..parts).map(|_| Aabb::cube(corner.map(|at| at + random.next()), 0.5)));
         }
-        // In nobody's possession, through a row of bodies.
+        // A rod without an owner, through a row of bodies.
         boxes.push(Aabb::new([0.0, 0.4, 0.4], [20.0, 0.6, 0.6]));
         let membership = |k: usize| Membership { owner: (k / parts + 1) as u32 % 65, ..Membership::ALL };
         let memberships: Vec<Membership> = (0..boxes.len()).map(membership).collect();
@@ -220,7 +220,8 @@ fn bodies_are_not_searched_within() {
 
 #[test]
 fn limit_counts_wanted_pairs_only() {
-    // All overlap. Of 1200 boxes the 100 of the second group collide with the 1100 of the first, and with nothing else.
+    // All overlap. Of 1200 boxes the 100 of the second group collide with the 1100 of the first, and with nothing
+    // else.
     let boxes = [Aabb::cube([3.0; 3], 1.0); 1200];
     let memberships: Vec<_> = (0..1200).map(|k| if k % 12 == 5 { of(2, 1) } else { of(1, 2) }).collect();
     let mut pairs = filtered(&memberships);

@@ -38,7 +38,7 @@ fn events_between_frames_lose_no_pair() {
             // Long enough between events for pairs to be kept again.
             3 => boxes.extend(random.cubes(25, [11.0; 3], 0.6)),
             5 => boxes.truncate(boxes.len() - 40),
-            // Fewer and more again: the same positions stand for other boxes.
+            // Fewer and more again: the same positions hold other boxes.
             6 => boxes.extend(random.cubes(30, [11.0; 3], 0.6)),
             8 => {
                 let last = boxes.len() - 1;
@@ -83,7 +83,7 @@ fn scene_far_from_the_origin() {
     }
 }
 
-/// Few boxes, and enough for an error in each part of several threads. Of the latter a third remains.
+/// Few boxes; then enough for an error in the part of each of several threads, a third of which remain.
 #[test]
 fn frame_after_an_error_is_right() {
     for (count, side, step, period) in [(500, 10.0, 0.04, 12), (1500, 15.0, 0.02, 20)] {

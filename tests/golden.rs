@@ -86,7 +86,7 @@ fn assert_golden(frames: Frames, mut algorithms: Vec<(String, Box<dyn BroadPhase
         for (frame, boxes) in frames.of(scenario).enumerate() {
             let pairs = &mut orders[frame % 2];
             for ((id, algorithm), hash) in algorithms.iter_mut().zip(&mut hashes) {
-                // The previous algorithm left the right answer.
+                // Spoils the list: the previous algorithm left the right answer in it.
                 pairs.push(u32::MAX - 1, u32::MAX);
                 algorithm.find_pairs(&boxes, pairs).unwrap_or_else(|e| panic!("{id} on {scenario}: {e}"));
                 if pairs.order() == PairOrder::Canonical {

@@ -15,7 +15,8 @@ const BOXES: usize = if cfg!(miri) { 18 } else { 40 };
 /// Frames of a scene.
 const FRAMES: usize = if cfg!(miri) { 3 } else { 4 };
 
-/// Compares each frame with the double loop, without and with a filter, then moves the boxes, removes two and adds one.
+/// Compares each frame with the double loop, without and with a filter, then moves the boxes, removes two and adds
+/// one.
 fn assert_frames_agree(name: &str, mut boxes: Vec<Aabb>, algorithms: &mut [(String, Box<dyn BroadPhase>)]) {
     let mut random = Random(41);
     for frame in 0..FRAMES {
@@ -31,7 +32,7 @@ fn assert_frames_agree(name: &str, mut boxes: Vec<Aabb>, algorithms: &mut [(Stri
             pairs.set_filter((!memberships.is_empty()).then(|| Filter::new(memberships)));
             assert_each_finds(&expected, algorithms, &boxes, &mut pairs, &format!("{name}, frame {frame}"));
         }
-        // One box in four, so that kept pairs are of use.
+        // Only one box in four moves, so that keeping pairs pays.
         for b in boxes.iter_mut().step_by(4) {
             let by = (random.next() - 0.5) * (b.max[0] - b.min[0]);
             // Infinite boxes stay.
@@ -74,7 +75,7 @@ fn equal_boxes() {
     assert_frames_agree("the same box", vec![Aabb::cube([3.0; 3], 1.0); 20], &mut every_algorithm());
 }
 
-/// The same algorithms on one scene after the other. Under Miri each costly scene is a test by itself.
+/// The same algorithms on one scene after another. Under Miri each expensive scene is a test of its own.
 #[test]
 fn one_scene_after_another() {
     let mut algorithms = every_algorithm();

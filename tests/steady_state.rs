@@ -68,7 +68,7 @@ fn steady_state_allocates_nothing() {
         let mut algorithm = registry.create(&id).unwrap();
         let rounds = if id.method() == "pair-cache" { 7 } else { 2 };
         for scenario in [Scenario::Uniform, Scenario::Mixed, Scenario::Gravity, Scenario::Fragmentation] {
-            // Each algorithm with and without extras.
+            // Each algorithm runs with and without extras.
             let extras = matches!(scenario, Scenario::Mixed | Scenario::Gravity);
             // Fewer would not keep four threads busy.
             let objects = if id.threads() > 2 { 4096 } else { 3000 };
@@ -89,12 +89,12 @@ fn steady_state_allocates_nothing() {
         }
     }
     for extras in [false, true] {
-        // With learning, times could switch to an algorithm that has not had so large a frame yet.
+        // With learning, measured times could select an algorithm that has not run so large a frame yet.
         // `fragmentation` passes its crossovers: 60 n = 5000 + 30 n at 167, 5000 + 30 n = 30 000 + 10 n at 1250.
         let costs = [("brute@cpu1", 0.0, 60.0), ("sap@cpu1", 5_000.0, 30.0), ("grid-sap@cpu1", 30_000.0, 10.0)];
         let mut adaptive = Adaptive::new(tuning(registry.entries(), 0.0, &costs), &registry).unwrap();
         adaptive.set_learning(false);
-        // The clock decides when to switch: the first frame of an algorithm may be its largest.
+        // The clock decides when to switch, so the first frame of an algorithm may be its largest.
         adaptive.prepare(3000);
         let (counted, _) = allocations(Scenario::Fragmentation, 3000, 600, 7, &mut adaptive, extras);
         assert_eq!(counted, 0, "adaptive, switches included, extras: {extras}");

@@ -4,8 +4,9 @@
 //! cargo run --release -p sapwise-example-rapier3d -- --frames 300 --bodies 110 --record tests/fixtures/fragments.npy
 //! ```
 //!
-//! The boxes have the order of rapier's colliders. A new piece takes the place of a removed one, so that a position
-//! stands for other boxes from frame to frame. The octants of a whole cube touch each other, as in no scenario.
+//! The boxes have the order of rapier's colliders. A new piece takes the position of a removed one, so the same
+//! position holds different boxes from frame to frame. The octants of a whole cube touch each other, which no scenario
+//! has.
 
 mod common;
 

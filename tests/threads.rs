@@ -47,7 +47,7 @@ fn helpers_start_with_the_first_frame_that_needs_them() {
     let mut large = space(&registry, 100_000);
     assert_eq!(update(&mut large), "pair-cache@cpu3");
     assert_eq!((all(), threads("sapwise-2-")), (before + 2, 2));
-    // Clones run on the same threads, and so does what else the registry makes.
+    // Clones, and other spaces of the same registry, run on the same threads.
     let mut clones: Vec<Space> = (0..8).map(|_| large.clone()).collect();
     clones.push(space(&registry.clone(), 100_000));
     clones.iter_mut().for_each(|clone| assert_eq!(update(clone), "pair-cache@cpu3"));
@@ -63,7 +63,7 @@ fn helpers_start_with_the_first_frame_that_needs_them() {
     }
     assert_eq!(all(), before);
 
-    // Nor does a clone of what runs on one thread, or on a program's pool, start any.
+    // A clone of a space that runs on one thread, or on a program's pool, starts no helper either.
     let mut one = space(&Registry::with_cores(1), 100_000).clone();
     assert_eq!((update(&mut one), all()), ("pair-cache@cpu1".to_owned(), before));
     let mut registry = Registry::with_cores(8);

@@ -108,8 +108,8 @@ impl Clock {
     }
 }
 
-/// Returns the fewest bytes that the dispatches of a kernel read and write in a frame: whole sectors of 32 bytes where
-/// boxes come in random order. `None` for small kernels. A cell of the grid is counted for each box.
+/// Returns the fewest bytes that the dispatches of a kernel read and write in a frame, `None` for small kernels. Boxes
+/// in random order count as whole sectors of 32 bytes. One cell of the grid is counted for each box.
 fn bytes(method: &str, kernel: &str, dispatches: usize, boxes: usize, pairs: usize) -> Option<f64> {
     let of_box = match (method, kernel) {
         // Box; key, reach and rank; count.

@@ -1,4 +1,4 @@
-//! Who takes part.
+//! The contestants: our algorithms and those of other crates.
 
 use crate::ground::{Ground, Grounded};
 use crate::naive::Naive;
@@ -23,15 +23,15 @@ pub(crate) enum Side {
     Peer,
 }
 
-/// One that takes part.
+/// An algorithm in the race.
 pub(crate) struct Contestant {
     pub(crate) name: String,
     pub(crate) side: Side,
-    /// Whether it keeps something from frame to frame, and so has to go through the frames before the timed ones.
+    /// Whether it keeps state from frame to frame, and therefore must run the frames before the timed ones.
     pub(crate) keeps: bool,
-    /// The largest number of objects that it is asked for.
+    /// The largest number of objects at which it races.
     pub(crate) most: usize,
-    /// Hopeless frames in a row, up to the last one.
+    /// Consecutive hopeless frames, up to the last one.
     pub(crate) hopeless_frames: u32,
     algorithm: Box<dyn BroadPhase>,
 }
@@ -45,7 +45,7 @@ impl Contestant {
         Self::new(name, Side::Peer, keeps, most, Box::new(algorithm))
     }
 
-    /// The same with a tree for the boxes that are declared fixed.
+    /// Makes a peer with a separate tree for the boxes that are declared fixed.
     fn grounded<G: Ground + 'static>(
         name: &str,
         keeps: bool,
@@ -55,12 +55,13 @@ impl Contestant {
         Self::peer(name, keeps, most, Grounded::<G, _>::new(algorithm))
     }
 
-    /// The name without the number of threads.
+    /// Returns the name without the number of threads.
     pub(crate) fn short_name(&self) -> &str {
         self.name.split(['@', '(']).next().unwrap_or_default().trim_end()
     }
 
-    /// A method of ours. Those whose time grows faster than the number of objects leave where they are far behind.
+    /// Makes a method of ours. One whose time grows faster than the number of objects races only at sizes at which it
+    /// is not far behind.
     fn fixed(id: &AlgorithmId, registry: &Registry) -> Result<Self, Error> {
         let most = match id.method() {
             "brute" => 3_000,
@@ -73,16 +74,16 @@ impl Contestant {
     }
 
     /// # Errors
-    /// Whatever keeps it from finding the pairs.
+    /// Those of the algorithm.
     pub(crate) fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
         self.algorithm.find_pairs(boxes, pairs)
     }
 }
 
-/// Ours: the adaptive one over this tuning, and every method that the registry lists.
+/// Makes our contestants: the adaptive one over this tuning, and every method that the registry lists.
 ///
 /// # Errors
-/// When one of them can't be made.
+/// If one of them can't be made.
 pub(crate) fn ours(registry: &Registry, tuning: &Tuning) -> Result<Vec<Contestant>, Error> {
     let adaptive = Box::new(Adaptive::new(tuning.clone(), registry)?);
     let mut all = vec![Contestant::new("adaptive", Side::Adaptive, true, usize::MAX, adaptive)];
@@ -92,10 +93,11 @@ pub(crate) fn ours(registry: &Registry, tuning: &Tuning) -> Result<Vec<Contestan
     Ok(all)
 }
 
-/// The peers on one thread; with a pool those of them that are fastest there, beside all that have a parallel form.
+/// Makes the peers. Without a pool: all, on one thread. With a pool: those that are fastest on one thread, and all
+/// that have a parallel form.
 pub(crate) fn peers(pool: Option<&Arc<ThreadPool>>, scenario: Scenario) -> Vec<Contestant> {
     let all = usize::MAX;
-    // Trees that take long for many boxes that move. In `city` few do.
+    // These trees take long for many moving boxes. In `city` few move.
     let most = if scenario == Scenario::City { all } else { 100_000 };
     let mut peers = vec![
         Contestant::grounded::<Bvh>("parry3d refit", true, all, Parry::new(Upkeep::Refit, None)),
@@ -112,7 +114,7 @@ pub(crate) fn peers(pool: Option<&Arc<ThreadPool>>, scenario: Scenario) -> Vec<C
             Contestant::grounded::<Rtree>("rstar", false, most, Packed),
             Contestant::peer("double loop", false, 3_000, Naive),
         ]),
-        // Without a tree for fixed boxes: `city` runs on one thread.
+        // They need no tree for fixed boxes: `city` runs on one thread only.
         Some(pool) => peers.extend([
             Contestant::peer("parry3d refit (2 threads)", true, all, Parry::new(Upkeep::Refit, Some(pool))),
             Contestant::peer("parry3d optimise (2 threads)", true, all, Parry::new(Upkeep::Optimise, Some(pool))),

@@ -19,7 +19,7 @@ pub(crate) struct Grounded<G, P> {
     ground: Option<G>,
     fixed: Vec<u32>,
     movers: Vec<u32>,
-    /// Of the movers.
+    /// Boxes of the movers.
     boxes: Vec<Aabb>,
     among: Pairs,
 }

@@ -1,4 +1,4 @@
-//! What ours know of this machine.
+//! The tuning that our algorithms use on this machine.
 
 use crate::settings::Settings;
 use sapwise::tuning::Source;
@@ -6,11 +6,11 @@ use sapwise::{Registry, Tuning};
 use sapwise_tune::Model;
 use sapwise_tune::measure::{self, Options};
 
-/// The tuning for a number of threads that the built-in model predicts from hardware parameters, which are measured
-/// now; written down by hand where nothing is timed.
+/// Measures the hardware and returns the tuning that the built-in model predicts from it for a number of threads. If
+/// nothing is timed, returns the usual tuning instead.
 ///
 /// # Errors
-/// When nothing can be predicted.
+/// If nothing can be predicted.
 pub(crate) fn tuning(registry: &Registry, threads: u32, settings: &Settings) -> Result<Tuning, String> {
     if !settings.full {
         return Ok(Tuning::usual(registry));
@@ -18,6 +18,6 @@ pub(crate) fn tuning(registry: &Registry, threads: u32, settings: &Settings) -> 
     let hardware = measure::hardware(&Options::default().with_threads(Some(threads)));
     let model = Model::built_in().map_err(|e| e.to_string())?;
     let prediction = model.predict(&hardware, &registry.available()).map_err(|e| e.to_string())?;
-    // Where there are costs, they decide; the slice through loads is for people.
+    // The costs decide; the slice through loads is only shown to people.
     Ok(Tuning::from_costs(Source::Predicted, "uniform", prediction.costs, &[]))
 }

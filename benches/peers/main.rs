@@ -47,7 +47,7 @@ use std::time::Instant;
 /// Fewest objects on two threads: below, no second thread gains anything.
 const FEWEST_FOR_TWO: usize = 1_000;
 
-/// Runs a race and says how it went.
+/// Runs a race and prints its result.
 fn measured(
     make: &dyn Fn() -> Result<Vec<Contestant>, String>,
     scenario: Scenario,
@@ -58,12 +58,12 @@ fn measured(
     let told = |e| format!("{scenario} at {objects} objects: {e}");
     let point = race::race(make, scenario, objects, settings).map_err(told)?;
     println!("{}, {:.1} s", table::line(&point), start.elapsed().as_secs_f64());
-    // A run that is cut short keeps what it has printed. Whoever stopped listening gets no more.
+    // An interrupted run keeps what it has printed. A failure means that nobody reads any more.
     let _ = std::io::stdout().flush();
     Ok(point)
 }
 
-/// Those of some names, or all.
+/// Returns the contestants with these names; all if there is no name.
 fn chosen(mut all: Vec<Contestant>, names: &[String]) -> Result<Vec<Contestant>, String> {
     let is = |c: &Contestant, name: &String| c.name == *name || c.short_name() == name;
     if let Some(name) = names.iter().find(|name| !all.iter().any(|c| is(c, name))) {
@@ -74,8 +74,8 @@ fn chosen(mut all: Vec<Contestant>, names: &[String]) -> Result<Vec<Contestant>,
     Ok(all)
 }
 
-/// Measures all scenarios on one thread, or `uniform` on several, behind what was compared before. Calls `keep` after
-/// each scenario.
+/// Measures all scenarios on one thread, or `uniform` on several threads, and appends the points to `compared`. Calls
+/// `keep` after each scenario.
 fn compare(
     threads: u32,
     settings: &Settings,
@@ -86,7 +86,7 @@ fn compare(
     let mut registry = Registry::with_cores(threads);
     registry.pin_threads();
     let tuning = machine::tuning(&registry, threads, settings)?;
-    // Bound to a core each, as the threads of the registry.
+    // Each thread is bound to a core, like those of the registry.
     let pool = || pinned_pool(threads).map(Arc::new).map_err(|e| e.to_string());
     let pool = if threads > 1 { Some(pool()?) } else { None };
     compared.push((threads, Vec::new()));

@@ -28,13 +28,13 @@ pub(crate) struct Obvhs {
 }
 
 impl Obvhs {
-    /// One that builds a new tree in each frame, with its queries spread over the pool where there is one.
+    /// Makes one that builds a new tree in each frame, and spreads its queries over the pool, if there is one.
     pub(crate) fn rebuilding(pool: Option<&Arc<ThreadPool>>) -> Self {
         let (builder, tree) = (PlocBuilder::new(), Bvh2::default());
         Self { refits: false, pool: pool.cloned(), builder, tree, bounds: Vec::new(), found: Vec::new() }
     }
 
-    /// One that keeps the tree while the number of boxes stays the same.
+    /// Makes one that keeps the tree while the number of boxes stays the same, and refits it.
     pub(crate) fn refitting() -> Self {
         Self { refits: true, ..Self::rebuilding(None) }
     }
@@ -69,7 +69,7 @@ fn build(builder: &mut PlocBuilder, tree: &mut Bvh2, bounds: &[Bounds]) {
     builder.build_with_bvh(tree, PlocSearchDistance::Minimum, bounds, indices, SortPrecision::U64, 0);
 }
 
-/// The primitives whose leaves touch some bounds. Each leaf holds one primitive.
+/// Calls `found` with each primitive whose leaf touches these bounds. Each leaf holds one primitive.
 fn touching(tree: &Bvh2, bounds: Bounds, mut found: impl FnMut(u32)) {
     tree.aabb_traverse(bounds, |tree, at| {
         found(tree.primitive_indices[tree.nodes[at as usize].first_index as usize]);
@@ -89,7 +89,7 @@ impl Ground for Bvh2 {
     }
 }
 
-/// The pairs of the leaves among some nodes with leaves of higher primitives.
+/// Calls `pair` with each leaf among these nodes and each touching leaf of a higher primitive.
 fn query(tree: &Bvh2, nodes: std::ops::Range<usize>, mut pair: impl FnMut(u32, u32)) {
     for node in tree.nodes[nodes].iter().filter(|n| n.is_leaf()) {
         let id = tree.primitive_indices[node.first_index as usize];
@@ -122,8 +122,9 @@ impl BroadPhase for Obvhs {
     }
 }
 
-/// The scheme of its example `physics` with `Bvh2::move_primitive`: leaves with a margin, each moved in the tree when
-/// its box leaves it. As in parry3d's scheme, near pairs are kept, and only leaves that moved are queried.
+/// The scheme of obvhs's example `physics` with `Bvh2::move_primitive`: leaves have a margin, and a leaf is moved in
+/// the tree when its box leaves it. As in parry3d's scheme, near pairs are kept, and only leaves that moved are
+/// queried.
 pub(crate) struct Moving {
     builder: PlocBuilder,
     tree: Bvh2,
@@ -176,7 +177,7 @@ impl BroadPhase for Moving {
         pairs.clear();
         self.update(boxes);
         let (moved, near) = (&self.moved, &mut self.near);
-        // One that is gone counts as moved.
+        // A box that is gone counts as moved.
         let stays = |k: u32| moved.get(k as usize) == Some(&false);
         near.retain(|&(a, b)| stays(a) && stays(b));
         for (k, leaf) in (0..).zip(&self.leaves).filter(|&(k, _)| !stays(k)) {

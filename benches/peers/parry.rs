@@ -8,19 +8,19 @@ use rayon::prelude::*;
 use sapwise::{Aabb, BroadPhase, Error, Pairs};
 use std::sync::Arc;
 
-/// What is done to the tree before its pairs are found.
+/// How the tree is updated before its pairs are found.
 #[derive(Clone, Copy)]
 pub(crate) enum Upkeep {
     /// Refit alone.
     Refit,
     /// One step of `optimize_incremental`, then refit: what rapier does in each frame.
     Optimise,
-    /// A new tree by binned splits, in the memory of the old one.
+    /// Rebuild by binned splits, in the memory of the old tree.
     Rebuild,
 }
 
-/// The leaves updated, the tree kept up, then traversed against itself. On a pool the updates, the refit and the
-/// traversal run in their parallel form; `optimize_incremental` and `rebuild` have none.
+/// Updates the leaves, then the tree, and traverses it against itself. With a pool the leaf updates, the refit and the
+/// traversal run in parallel; `optimize_incremental` and `rebuild` have no parallel form.
 pub(crate) struct Parry {
     upkeep: Upkeep,
     pool: Option<Arc<ThreadPool>>,
@@ -44,8 +44,8 @@ impl Ground for Bvh {
     }
 }
 
-/// Makes the leaves as many as the boxes: a new tree where more than `few` come or go, since one by one they take
-/// longer; else those beyond the last box are removed, and new ones are inserted when they are updated.
+/// Adapts the number of leaves to the number of boxes. If more than `few` boxes come or go, rebuilds the tree, which
+/// is faster than changing it box by box. Otherwise removes surplus leaves; missing ones are inserted by their update.
 fn resize(tree: &mut Bvh, boxes: &[Aabb], few: usize) {
     let (before, now) = (tree.leaf_count() as usize, boxes.len());
     if before.abs_diff(now) > few {
@@ -56,7 +56,7 @@ fn resize(tree: &mut Bvh, boxes: &[Aabb], few: usize) {
 }
 
 impl Upkeep {
-    /// How many leaves of so many boxes may come or go one by one.
+    /// Returns the most boxes that may come or go without a rebuild.
     fn few(self, boxes: usize) -> usize {
         match self {
             Self::Refit | Self::Optimise => boxes / 4,
@@ -89,7 +89,7 @@ impl Parry {
         match self.upkeep {
             Upkeep::Rebuild => self.tree.rebuild(&mut self.workspace, BvhBuildStrategy::Binned),
             _ if parallel => self.tree.refit_parallel(&mut self.workspace),
-            // The nodes stay where they are, so that there is nothing to gain from sorting them again.
+            // The order of the nodes does not change, so sorting them again gains nothing.
             Upkeep::Refit => self.tree.refit_without_opt(),
             Upkeep::Optimise => self.tree.refit(&mut self.workspace),
         }
@@ -113,12 +113,12 @@ impl BroadPhase for Parry {
     }
 }
 
-/// Leaves larger than their boxes by this share of the box's shortest edge on each side. In `uniform` and `resting`
-/// half of it is slower or as fast.
+/// Margin of a leaf on each side, as a share of the box's shortest edge. In `uniform` and `resting` half of it is
+/// slower or as fast.
 const MARGIN: f32 = 0.2;
 
-/// The margin about a box: no wider for a sheet or a rod, whose leaf would touch many others. Above zero, where
-/// parry3d detects no change.
+/// Returns the margin around a box. It follows the shortest edge, because the leaf of a sheet or a rod would otherwise
+/// touch many others. It is above zero, because without a margin parry3d detects no change.
 pub(crate) fn margin(b: &Aabb) -> f32 {
     let edge = (0..3).map(|a| b.max[a] - b.min[a]).fold(f32::INFINITY, f32::min);
     (edge * MARGIN).max(f32::MIN_POSITIVE)
@@ -128,20 +128,20 @@ pub(crate) fn margin(b: &Aabb) -> f32 {
 /// is slower in `uniform` and `resting`.
 const OPTIMISE_EVERY: u32 = 5;
 
-/// If more than one box in this many left its leaf, all nodes are refitted: a partial refit walks up from each.
+/// All nodes are refitted if more than one box in `PARTIAL` left its leaf: a partial refit walks up from each.
 const PARTIAL: usize = 8;
 
-/// What is done with a leaf that its box has left.
+/// How a leaf is updated that its box has left.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Leaving {
-    /// It grows where it is, and the tree is optimised now and then.
+    /// It grows in place, and the tree is optimised every few frames.
     Stays,
-    /// It is removed and inserted again, and only the paths from such leaves are refitted if they are few.
+    /// It is removed and inserted again. If there are few such leaves, only the paths from them are refitted.
     Reinserted,
 }
 
-/// The scheme of rapier's broad phase: leaves with a margin, a traversal only where a box left its leaf, and a list
-/// of near pairs that is kept from frame to frame; those of them that overlap are the pairs.
+/// The scheme of rapier's broad phase: leaves have a margin, and only those that their boxes left are searched. A list
+/// of near pairs is kept from frame to frame; the near pairs that overlap are the pairs.
 pub(crate) struct Margin {
     leaving: Leaving,
     tree: Bvh,
@@ -159,7 +159,7 @@ impl Margin {
         Self { leaving, tree, workspace, changed: Vec::new(), changes, near: Vec::new(), frame: 0 }
     }
 
-    /// Puts every box into a leaf that holds it, and notes which leaves changed.
+    /// Makes every leaf hold its box, and notes which leaves changed.
     fn update(&mut self, boxes: &[Aabb]) {
         let [now, before] = &mut self.changes;
         std::mem::swap(now, before);

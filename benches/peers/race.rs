@@ -13,39 +13,39 @@ use std::time::{Duration, Instant};
 /// Seed of the scenes and of the order of turns.
 const SEED: u64 = 1;
 
-/// Frames before the timed ones, for those who keep something from frame to frame.
+/// Warm-up frames, for contestants that keep state from frame to frame.
 const WARM_UP: u64 = 64;
 
-/// The last of them, in which all run, to make their buffers.
+/// The last warm-up frames, in which all contestants run, to allocate their buffers.
 const WARM_UP_OF_ALL: u64 = 2;
 
-/// Who takes longer for a frame leaves.
+/// A contestant leaves if a frame takes longer.
 const LONGEST_FRAME: Duration = Duration::from_secs(3);
 
-/// A frame is hopeless that takes longer than this and [`HOPELESS_RATIO`] times as long as that of the fastest: trees
-/// that are refitted and nothing else come to that where objects move far.
+/// A frame is hopeless if it takes longer than this and longer than [`HOPELESS_RATIO`] × the fastest. Trees that are
+/// only refitted reach that if objects move far.
 const HOPELESS_FRAME: Duration = Duration::from_millis(50);
 const HOPELESS_RATIO: u32 = 20;
 
-/// Who has so many hopeless frames in a row leaves. A single one may be the scheduler's fault.
+/// A contestant leaves after this many consecutive hopeless frames. A single one may be the scheduler's fault.
 const HOPELESS_FRAMES: u32 = 3;
 
-/// Timed frames at least.
+/// Fewest timed frames.
 const FEWEST_FRAMES: usize = 5;
 
-/// Timed frames at most: with up to a thousand objects, and beyond.
+/// Most timed frames: with up to a thousand objects, and with more.
 const MOST_FRAMES: [usize; 2] = [400, 60];
 
-/// Those who race, and what they share.
+/// The contestants, and what they share.
 pub(crate) struct Race {
     pub(crate) contestants: Vec<Contestant>,
     pub(crate) scene: Scene,
-    /// One list for all, so that its memory is equally warm for each.
+    /// Shared by all contestants, so that its memory is equally warm for each.
     pairs: Pairs,
     random: Random,
 }
 
-/// The filter of a scene: in `city` objects are declared fixed.
+/// Returns the filter of a scene: in `city` objects are declared fixed.
 fn filter(scene: &Scene) -> Option<Filter> {
     let membership = |k| Membership { fixed: scene.is_fixed(k), ..Membership::ALL };
     (scene.scenario() == Scenario::City).then(|| Filter::new((0..scene.boxes().len()).map(membership).collect()))
@@ -58,11 +58,11 @@ impl Race {
         Self { contestants, scene, pairs, random: Random::new(seed) }
     }
 
-    /// Runs all, or only those who keep something, on the frame of the scene in random order. The time that each of
-    /// them took, and `None` for those who did not run.
+    /// Runs all contestants, or only those that keep state, on the current frame in random order. Returns the time of
+    /// each; `None` for those that did not run.
     ///
     /// # Errors
-    /// When a contestant fails or finds other pairs than the rest.
+    /// If a contestant fails or finds other pairs than the rest.
     pub(crate) fn frame(&mut self, all: bool) -> Result<Vec<Option<Duration>>, String> {
         let boxes = self.scene.boxes();
         let mut taken = vec![None; self.contestants.len()];
@@ -84,7 +84,7 @@ impl Race {
         Ok(taken)
     }
 
-    /// Runs the frames before the timed ones. Returns the names of those who left.
+    /// Runs the warm-up frames. Returns the names of those that left.
     ///
     /// # Errors
     /// As in [`Race::frame`].
@@ -98,7 +98,7 @@ impl Race {
         Ok(left)
     }
 
-    /// Takes those out who take too long, and returns their names.
+    /// Removes the contestants that take too long, and returns their names.
     pub(crate) fn leave_out_slow(&mut self, taken: &[Option<Duration>]) -> Vec<String> {
         let fastest = taken.iter().flatten().min().copied().unwrap_or_default();
         let hopeless = HOPELESS_FRAME.max(fastest * HOPELESS_RATIO);
@@ -112,7 +112,7 @@ impl Race {
     }
 }
 
-/// The frame in which a scenario first has as many objects as it ever has. It does not depend on their number.
+/// Returns the first frame in which a scenario has its peak number of objects. It does not depend on that number.
 fn first_peak(scenario: Scenario) -> u64 {
     let mut scene = scenario.start(100, SEED);
     while !is_at_peak(&scene) {
@@ -121,19 +121,19 @@ fn first_peak(scenario: Scenario) -> u64 {
     scene.frame()
 }
 
-/// Only in `fragmentation` the number of objects changes. Times of different numbers can't be put together.
+/// Returns whether a scene has its peak number of objects. Times of different numbers of objects can't be combined,
+/// and in `fragmentation` the number changes.
 pub(crate) fn is_at_peak(scene: &Scene) -> bool {
     scene.boxes().len() == scene.peak_objects()
 }
 
 /// Runs the contestants through a scenario at a size, then again for their slowest frames.
 ///
-/// The scene goes on from frame to frame, so that who keeps the work of the last frame finds objects where they never
-/// were before. In `fragmentation` the frames at the peak are timed; those who keep something go through the others
-/// too.
+/// The scene never repeats a frame, so a contestant that keeps state meets objects at new places. In `fragmentation`
+/// the frames at the peak are timed; contestants that keep state run the other frames too.
 ///
 /// # Errors
-/// When a contestant fails or finds other pairs than the rest.
+/// If a contestant fails or finds other pairs than the rest.
 pub(crate) fn race(
     make: &dyn Fn() -> Result<Vec<Contestant>, String>,
     scenario: Scenario,

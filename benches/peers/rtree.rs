@@ -1,4 +1,4 @@
-//! rstar's R*-tree: packed again in each frame. It has no threads.
+//! rstar's R*-tree, packed anew in each frame. It runs on one thread.
 
 use crate::ground::Ground;
 use rstar::{AABB, RTree, RTreeObject};
@@ -36,7 +36,8 @@ impl Ground for Rtree {
     }
 }
 
-/// Bulk load, then one query for each box in the order of the leaves. Joining the tree with itself takes as long.
+/// Loads the tree in bulk, then queries it for each box in the order of the leaves. Joining the tree with itself takes
+/// as long.
 pub(crate) struct Packed;
 
 impl BroadPhase for Packed {

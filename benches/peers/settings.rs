@@ -1,4 +1,4 @@
-//! What is measured, from the environment.
+//! The settings of a run, read from environment variables.
 
 use sapwise_scenes::Scenario;
 use std::fmt::Display;
@@ -6,14 +6,14 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
 
-/// Not measured unless they are named.
+/// Scenarios that are measured only if they are named.
 const LEFT_OUT: [Scenario; 2] = [Scenario::Brownian, Scenario::FreeFall];
 
 const SIZES: [usize; 9] = [100, 300, 1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000];
 
-/// What is measured and for how long.
+/// What to measure, and for how long.
 pub(crate) struct Settings {
-    /// Whether figures are wanted; else everything runs for a few frames, to see that all is well.
+    /// Whether to measure; otherwise everything runs for a few frames, as a test.
     pub(crate) full: bool,
     pub(crate) scenarios: Vec<Scenario>,
     /// Numbers of objects, ascending.
@@ -21,11 +21,11 @@ pub(crate) struct Settings {
     pub(crate) threads: Vec<u32>,
     /// Time for the timed frames of a scenario at a size.
     pub(crate) time: Duration,
-    /// Time for the slowest frames of a scenario at a size. Zero leaves them out.
+    /// Time for the slowest frames of a scenario at a size. Zero skips them.
     pub(crate) tail_time: Duration,
-    /// Names of those who take part, without what follows `@` or ` (`; all where it is empty.
+    /// Names of the contestants, with or without what follows `@` or ` (`; empty for all.
     pub(crate) contestants: Vec<String>,
-    /// The folder that the results go into.
+    /// The folder for the results.
     pub(crate) results: Option<PathBuf>,
 }
 
@@ -50,20 +50,21 @@ impl Settings {
     }
 }
 
-/// The values in a variable, separated by commas; at least one where it is set.
+/// Returns the values in a variable, separated by commas; at least one if it is set.
 fn list<T: FromStr<Err: Display>>(name: &str) -> Result<Option<Vec<T>>, String> {
     let Ok(text) = std::env::var(name) else { return Ok(None) };
     let values = text.split(',').map(|word| word.trim().parse().map_err(|e| format!("{name}={text}: {e}")));
     values.collect::<Result<_, _>>().map(Some)
 }
 
-/// The time in a variable, in seconds.
+/// Returns the time in a variable, in seconds; `usual` if it is not set.
 fn seconds(name: &str, usual: f64) -> Result<Duration, String> {
     let seconds = list(name)?.map_or(usual, |all: Vec<f64>| all[0]);
     Duration::try_from_secs_f64(seconds).map_err(|e| format!("{name}={seconds}: {e}"))
 }
 
-/// The path in a variable, from the root of the workspace: cargo runs a benchmark in the folder of its package.
+/// Returns the path in a variable, relative to the root of the workspace: cargo runs a benchmark in the folder of its
+/// package.
 fn path(name: &str) -> Option<PathBuf> {
     std::env::var_os(name).map(|path| Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path))
 }

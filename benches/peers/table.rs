@@ -1,21 +1,21 @@
-//! The comparison as a line for each point and as CSV with every time.
+//! The results as one line for each point, and as CSV.
 
 use crate::contestants::Side;
 use crate::point::{Point, Quartiles};
 use std::fmt::Write;
 
-/// Three significant digits.
+/// Writes a number with three significant digits.
 fn digits(value: f64) -> String {
     let whole = value.abs().log10().floor().max(-9.0) as i32 + 1;
     format!("{value:.*}", usize::try_from(3 - whole).unwrap_or(0))
 }
 
-/// Median and quartiles.
+/// Writes the median with the quartiles.
 fn spread([low, median, high]: Quartiles) -> String {
     format!("{} ({} to {})", digits(median), digits(low), digits(high))
 }
 
-/// 1000 as 1k, 1000000 as 1M.
+/// Writes 1000 as 1k and 1000000 as 1M.
 fn size(objects: usize) -> String {
     match objects {
         n if n >= 1_000_000 && n.is_multiple_of(1_000_000) => format!("{}M", n / 1_000_000),
@@ -24,7 +24,7 @@ fn size(objects: usize) -> String {
     }
 }
 
-/// What was measured, in one line for whoever waits.
+/// Returns the result of a point in one line.
 pub(crate) fn line(point: &Point) -> String {
     let mut text = format!("{} {}:", point.scenario, size(point.objects));
     for side in [Side::Adaptive, Side::Fixed, Side::Peer] {
@@ -46,9 +46,9 @@ pub(crate) fn line(point: &Point) -> String {
     text
 }
 
-/// All times of all points in milliseconds: one row for each contestant. Without slowest frames the `tail_` columns are
-/// empty. Only the row of `adaptive` has the last column: the time of the fastest peer over its own, frame by frame,
-/// median.
+/// Returns the times of all points in milliseconds, one row for each contestant. Without slowest frames the `tail_`
+/// columns are empty. Only the row of `adaptive` has the last column: the median ratio of the fastest peer's time to
+/// its own in each frame.
 pub(crate) fn csv(results: &[(u32, Vec<Point>)]) -> String {
     let mut text = "threads,scenario,objects,contestant,median_ms,quartile_1_ms,quartile_3_ms,frames,\
         tail_p50_ms,tail_p99_ms,tail_worst_ms,tail_frames,tail_runs,peer_over_adaptive\n"

@@ -1,4 +1,4 @@
-//! The slowest frames: each stream several times, so that the machine's own interruptions do not count.
+//! The slowest frames. Each stream runs several times, so that interruptions by the machine do not count.
 
 use crate::contestants::{Contestant, Side};
 use crate::point::{Lane, Point, Tail};
@@ -8,42 +8,42 @@ use sapwise_scenes::Scene;
 use sapwise_tune::stats::quantile;
 use std::time::{Duration, Instant};
 
-/// Frames of a stream, and how often it is run.
+/// Frames of a stream, and numbers of runs by preference.
 const FRAMES: usize = 600;
 const RUNS: [usize; 3] = [5, 3, 1];
 
-/// Fewer frames have no 99th percentile: less time takes runs away first, then frames, then all.
+/// Fewer frames have no 99th percentile. If time is short, runs are dropped first, then frames, then everything.
 const FEWEST_FRAMES: usize = 100;
 
-/// Who has a median over this many times the fastest takes no part.
+/// A contestant takes no part if its median exceeds this many times the fastest.
 const RATIO: f64 = 8.0;
 
-/// Runs and frames for which the time is enough, when it is enough for `affordable` frames in all.
+/// Returns the numbers of runs and of frames that fit into `affordable` frames in all.
 fn plan(affordable: usize, warm_up: usize) -> Option<(usize, usize)> {
     let frames = |runs: usize| (affordable / runs).saturating_sub(warm_up);
     let runs = RUNS.into_iter().find(|&runs| frames(runs) >= FEWEST_FRAMES)?;
     Some((runs, frames(runs).min(FRAMES)))
 }
 
-/// Seconds of each frame of each run of one contestant.
+/// Seconds of each frame in each run of one contestant.
 struct Stream {
     name: String,
     runs: Vec<Vec<f64>>,
 }
 
 impl Stream {
-    /// The median of each frame over the runs.
+    /// Returns the median over the runs for each frame.
     fn medians(&self) -> Vec<f64> {
         let frame = |k: usize| self.runs.iter().map(|run| run[k]).collect::<Vec<f64>>();
         (0..self.runs[0].len()).filter_map(|k| quantile(&frame(k), 0.5)).collect()
     }
 }
 
-/// Runs the stream from `begin` on several times, each time with new contestants, and adds the tails to the lanes of
-/// ours and of the peers that keep something. Others have no slow frames of their own.
+/// Runs the stream that starts at `begin` several times, each time with new contestants. Adds the tails to the lanes
+/// of our contestants and of the peers that keep state; other peers have no slow frames of their own.
 ///
 /// # Errors
-/// When a contestant fails or finds other pairs than the rest.
+/// If a contestant fails or finds other pairs than the rest.
 pub(crate) fn measure(
     make: &dyn Fn() -> Result<Vec<Contestant>, String>,
     begin: &Scene,

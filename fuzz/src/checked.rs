@@ -70,7 +70,7 @@ impl Checked {
         let right = scene.answer();
         let mut room = scene.room();
         for (name, algorithm) in &mut self.0 {
-            // The previous algorithm left the right answer.
+            // Spoils the list: the previous algorithm left the right answer in it.
             room.clear();
             room.push(u32::MAX - 1, u32::MAX);
             let found = algorithm.find_pairs(scene.boxes(), &mut room);

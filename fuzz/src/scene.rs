@@ -88,7 +88,7 @@ impl Scene {
         }
     }
 
-    /// Adds up to 255 boxes, sometimes up to 2048: few boxes find as much, and sooner.
+    /// Adds up to 255 boxes, sometimes up to 2048: few boxes find the same faults sooner.
     fn add_many(&mut self, source: &mut Source<'_>) {
         let (mut random, few) = (source.random(), usize::from(source.byte()));
         let count = if few % 32 == 31 { source.below(2048) } else { few };

@@ -61,14 +61,14 @@ fuzz_mutator!(|data: &mut [u8], size: usize, max_size: usize, seed: u32| {
     }
 });
 
-/// Whatever a model predicts of a machine that was measured is sound.
+/// Asserts that what a model predicts of a measured machine is sound.
 fn predict(model: &Model, hardware: &Hardware) {
     if let Ok(prediction) = model.predict(hardware, &REGISTRY.available()) {
         write_and_run(prediction.tuning("uniform", &[]));
     }
 }
 
-/// What this library makes it can read.
+/// Asserts that the library reads what it writes.
 fn assert_reads_back(tuning: &Tuning) {
     let written = json::write_tuning(tuning).unwrap();
     assert_eq!(json::tuning(&written).unwrap(), *tuning);
@@ -79,7 +79,7 @@ fn write_and_run(tuning: Tuning) {
     run(tuning);
 }
 
-/// Frames by the tuning are right, and what is learned from them is sound.
+/// Runs frames by the tuning. Asserts that their pairs are right, and that what they teach is sound.
 fn run(tuning: Tuning) {
     let Ok(mut adaptive) = Adaptive::new(tuning, &REGISTRY) else { return };
     for (scene, right) in SCENES.iter().chain(&*SCENES) {

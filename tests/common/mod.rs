@@ -128,15 +128,15 @@ pub(crate) fn assert_each_finds(
     what: &str,
 ) {
     for (id, algorithm) in algorithms {
-        // The previous algorithm left the right answer.
+        // Spoils the list: the previous algorithm left the right answer in it.
         pairs.push(u32::MAX - 1, u32::MAX);
         algorithm.find_pairs(boxes, pairs).unwrap_or_else(|e| panic!("{id}, {what}: {e}"));
         assert!(pairs.as_slice() == expected, "{id}, {what}: {} pairs, not {}", pairs.len(), expected.len());
     }
 }
 
-/// Asserts that each algorithm names the first of two invalid boxes among `count`, the second of which is the last, and
-/// goes on.
+/// Asserts that each algorithm names the first of two invalid boxes among `count`, the second of which is the last,
+/// and goes on.
 pub(crate) fn assert_each_names_the_first_invalid(algorithms: Algorithms, count: usize, places: &[usize]) {
     let mut random = Random(11);
     for (id, mut algorithm) in algorithms {

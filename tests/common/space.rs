@@ -136,7 +136,7 @@ struct Model {
     given: BTreeSet<Handle>,
     /// The slots of bodies that were removed since the last update: no other body gets them before the next one.
     removed: BTreeSet<u64>,
-    /// The most bodies at once, where removed ones count until the next update. Slots are less.
+    /// The most bodies at once. Removed ones count until the next update. No slot reaches this number.
     most: usize,
     /// Boxes at the last update.
     seen: BTreeMap<Handle, Aabb>,

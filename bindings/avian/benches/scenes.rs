@@ -71,8 +71,8 @@ fn stacked(k: usize, edge: usize, distance: f32) -> Vec3 {
     Vec3::new(at(k % edge), 1.0 + (k / (edge * edge)) as f32 * distance, at(k / edge % edge))
 }
 
-/// Cubes that fall onto a heap. As wide as high: a tower topples where rounding decides, so that avian's own two runs
-/// with a cube moved by 0.00001 differ.
+/// Cubes that fall onto a heap, which is as wide as high. The direction in which a tower topples would depend on
+/// rounding: two runs of avian's own differ if a cube is moved by 0.00001.
 fn pile(world: &mut World, count: usize) {
     floor(world);
     let edge = (count as f32).cbrt().round() as usize;

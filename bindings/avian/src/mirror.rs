@@ -12,7 +12,7 @@ const STANDALONE: u32 = u32::MAX;
 /// The colliders of the bodies.
 pub(crate) type Bodies<'w, 's> = Query<'w, 's, &'static RigidBodyColliders, Allow<Disabled>>;
 
-/// What is in the place of a proxy.
+/// The collider in the place of a proxy, and its body in the space.
 #[derive(Debug, Clone, Copy)]
 struct Placed {
     collider: Entity,
@@ -129,8 +129,8 @@ fn body(proxy: &ColliderTreeProxy, key: ColliderTreeProxyKey) -> Body {
         .user_data(u64::from(key.id().id()) << 2 | key.tree_type() as u64)
 }
 
-/// Returns the owner of a collider. A search has less to test without owners, so a body that seems to have one collider
-/// is none. [`collect`](crate::collect) drops the pairs that are left.
+/// Returns the owner of a collider. A search has less to test without owners, so a body that seems to have one
+/// collider is none. [`collect`](crate::collect) drops the pairs that are left.
 fn owner(proxy: &ColliderTreeProxy, bodies: &Bodies) -> u32 {
     let of = |body| bodies.get(body).is_ok_and(|own| own.iter().len() > 1).then(|| Entity::index_u32(body) + 1);
     proxy.body.map_or(STANDALONE, |body| of(body).unwrap_or(0))

@@ -6,7 +6,7 @@ use sapwise::Handle;
 /// Borrows an array. NULL is an empty one.
 ///
 /// # Safety
-/// `first` points to `n` elements, or can be told to be wrong.
+/// `first` points to `n` elements, or [`check`] refuses it.
 pub(crate) unsafe fn slice<'a, T>(first: *const T, n: usize, what: &str) -> Result<&'a [T], Failure> {
     check(first, n, what)?;
     // SAFETY: of the caller; neither NULL nor misaligned nor beyond the address space.

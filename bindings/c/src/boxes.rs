@@ -34,7 +34,7 @@ pub(crate) struct Boxes<'a> {
 
 impl<'a> Boxes<'a> {
     /// # Safety
-    /// `min`, `n`, `stride` and `max` describe memory as the head of the header says, or can be told to be wrong.
+    /// `min`, `n`, `stride` and `max` describe memory as the head of the header says, or this function refuses them.
     #[inline]
     pub(crate) unsafe fn new(min: *const f32, n: usize, stride: usize, max: *const f32) -> Result<Self, Failure> {
         let least = if max.is_null() { size_of::<Aabb>() } else { size_of::<Corner>() };
@@ -47,17 +47,15 @@ impl<'a> Boxes<'a> {
         check(min, n, "boxes")?;
         check(max, if max.is_null() { 0 } else { n }, "max")?;
         if n.checked_mul(stride).is_none_or(|size| size > isize::MAX as usize) {
-            return Err(Failure::new(
-                SW_TOO_MANY,
-                format_args!("{n} boxes with a stride of {stride} bytes fit no memory"),
-            ));
+            let text = format_args!("{n} boxes with a stride of {stride} bytes fit no memory");
+            return Err(Failure::new(SW_TOO_MANY, text));
         }
         // The three floats behind the minimum, or nothing at all.
         let max = if max.is_null() { min.wrapping_add(3) } else { max };
         Ok(Self { min, max, stride, len: n, memory: PhantomData })
     }
 
-    /// Returns the boxes where they are, if they lie as the library wants them.
+    /// Returns the boxes in the caller's memory, if their layout is that of the library.
     pub(crate) fn as_slice(&self) -> Option<&'a [Aabb]> {
         if self.len == 0 {
             return Some(&[]);
@@ -76,7 +74,7 @@ impl<'a> Boxes<'a> {
         })
     }
 
-    /// Returns the boxes as the library wants them, through a copy if they do not lie so.
+    /// Returns the boxes in the layout of the library, copied if they have another one.
     pub(crate) fn to_slice<'b>(self, copy: &'b mut Vec<Aabb>) -> Result<&'b [Aabb], Failure>
     where
         'a: 'b,

@@ -1,4 +1,4 @@
-//! What a caller holds a pointer to: used by one call that changes it, or by several that read it.
+//! A value to which a caller holds a pointer: used by one call that changes it, or by several that read it.
 
 use crate::{Failure, sw_status::*};
 use std::cell::UnsafeCell;
@@ -104,17 +104,14 @@ pub(crate) unsafe fn free<T, V>(
 
 #[cold]
 fn refused(what: &str, users: u32) -> Failure {
-    match users {
-        BROKEN => Failure::new(SW_PANIC, format_args!("a call with this {what} has failed in the middle; free it")),
-        FREED => Failure::new(SW_FREED, format_args!("this {what} was freed; set pointers to NULL after freeing")),
-        CHANGING => Failure::new(SW_BUSY, format_args!("another thread changes this {what}; call after it")),
-        _ => Failure::new(
-            SW_BUSY,
-            format_args!(
-                "a query of this {what} runs; change it after the query, not in a callback or on another thread"
-            ),
-        ),
-    }
+    let after = "change it after the query, not in a callback or on another thread";
+    let (status, text) = match users {
+        BROKEN => (SW_PANIC, format!("a call with this {what} has failed in the middle; free it")),
+        FREED => (SW_FREED, format!("this {what} was freed; set pointers to NULL after freeing")),
+        CHANGING => (SW_BUSY, format!("another thread changes this {what}; call after it")),
+        _ => (SW_BUSY, format!("a query of this {what} runs; {after}")),
+    };
+    Failure { status, text }
 }
 
 #[cfg(test)]

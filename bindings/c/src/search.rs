@@ -16,7 +16,7 @@ struct Search {
     adaptive: Adaptive,
     between: Between,
     pairs: Pairs,
-    /// Of boxes that do not lie as the library wants them.
+    /// Copies of boxes with another layout than that of the library.
     copies: [Vec<Aabb>; 2],
 }
 

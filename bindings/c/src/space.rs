@@ -258,7 +258,7 @@ pub unsafe extern "C-unwind" fn sw_space_set_many(
             let each = || handles.iter().copied().zip(boxes.iter());
             let wrong = |&(handle, aabb): &(Handle, Aabb)| !space.contains(handle) || aabb.defect().is_some();
             if let Some((handle, aabb)) = each().find(wrong) {
-                // For its error.
+                // Returns its error.
                 return Ok(space.set(handle, aabb)?);
             }
             Ok(each().try_for_each(|(handle, aabb)| space.set(handle, aabb))?)

@@ -25,7 +25,7 @@ pub(crate) unsafe fn read<'a>(text: *const c_char, what: &str) -> Result<Option<
 pub(crate) unsafe fn write(text: &str, to: *mut c_char, size: usize) -> Result<usize, Failure> {
     if size > 0 {
         let fits = text.floor_char_boundary(size - 1);
-        // For NULL.
+        // Refuses NULL.
         // SAFETY: of the caller.
         unsafe { put(to, 0, "text") }?;
         // SAFETY: `fits` bytes and the zero are at most `size`.

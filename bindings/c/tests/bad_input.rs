@@ -1,4 +1,4 @@
-//! What C can get wrong is a status and a message. The pairs themselves are compared by the examples.
+//! Every mistake that a C program can make yields a status and a message. The examples compare the pairs themselves.
 
 use sapwise_capi::sw_status::*;
 use sapwise_capi::*;

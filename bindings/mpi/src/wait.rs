@@ -43,12 +43,8 @@ fn until(limit: Duration, communicator: &impl Communicator, what: &str, mut is_d
         let waited = began.elapsed();
         if waited > limit {
             let (rank, seconds) = (communicator.rank(), limit.as_secs_f64());
-            end(
-                communicator,
-                &format!(
-                    "rank {rank} has waited for {seconds} s for {what} of the others: one of them hangs or is gone"
-                ),
-            );
+            let waited = format!("rank {rank} has waited for {seconds} s for {what} of the others");
+            end(communicator, &format!("{waited}: one of them hangs or is gone"));
         }
         if waited > BRIEF {
             thread::sleep(NAP);

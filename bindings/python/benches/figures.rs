@@ -1,9 +1,9 @@
 //! The Rust half of `figures.py`: scenes, and the time of the library's own call.
 //!
 //! `figures scene uniform OBJECTS SEED FRAMES FILE` writes the frames of a scenario from the second on as 32-bit
-//! floats. `figures serve FILE ALGORITHM` answers each number on a line of the standard input with the times of as many
-//! frames, in nanoseconds, and the number of pairs; `figures space FILE ALGORITHM` does so for a space that is set to
-//! two frames of the file in turns.
+//! floats. `figures serve FILE ALGORITHM` reads a number of frames from each line of the standard input, and answers
+//! with the times of these frames in nanoseconds and the number of pairs. `figures space FILE ALGORITHM` does the same
+//! for a space that is set to two frames of the file in turn.
 
 use sapwise::{Aabb, Adaptive, Body, BroadPhase, PairOrder, Pairs, Registry, Space};
 use sapwise_scenes::Scenario;

@@ -1,4 +1,4 @@
-//! What searches for `pairs` and `pairs_between`, kept from call to call.
+//! The engines of `pairs` and `pairs_between`, kept from call to call.
 
 use crate::memory::most_pairs;
 use crate::{Corners, PyDecision, start, unusable};
@@ -51,10 +51,10 @@ pub(crate) struct Exactly<'a> {
     pub(crate) margin: f64,
 }
 
-/// What searches, with its lists of pairs, used by one call at a time.
+/// The searches with their lists of pairs, used by one call at a time.
 struct Engine {
     adaptive: Adaptive,
-    /// One for each algorithm that callers have named, with the name.
+    /// Each algorithm that callers have named, with the name.
     named: Vec<(String, Adaptive)>,
     between: Between,
     worlds: Worlds,
@@ -63,7 +63,7 @@ struct Engine {
     ran: Ran,
 }
 
-/// What ran last.
+/// The search that ran last.
 #[derive(Clone, Copy)]
 enum Ran {
     Adaptive,
@@ -73,8 +73,8 @@ enum Ran {
     Worlds(Load),
 }
 
-/// Engines that no call uses. Locked only by a thread with the interpreter's lock, and for an instant: no fork finds it
-/// locked.
+/// Engines that no call uses. Locked only by a thread with the interpreter's lock, and for an instant: no fork finds
+/// it locked.
 struct Idle {
     /// The process that made the engines. Their threads are not in a forked one.
     pid: u32,
@@ -239,16 +239,16 @@ impl Engine {
     }
 }
 
-/// Returns the default limit on the pairs of so many boxes. Few boxes take that of the previous call, if it can't
-/// refuse them: to read the free memory would cost more than the search.
+/// Returns the default limit on the pairs of a number of boxes. Few boxes take the limit of the previous call if it
+/// allows all their possible pairs: reading the free memory would cost more than the search.
 fn usual_limit(boxes: usize, previous: &Pairs) -> Option<usize> {
     let possible = boxes.saturating_mul(boxes) / 2;
     let suffices = boxes < MANY && previous.limit().is_none_or(|limit| possible <= limit);
     if suffices { previous.limit() } else { most_pairs() }
 }
 
-/// Returns whether most boxes that overlap on the best axis overlap: then nothing is faster than a sweep along it, and
-/// thresholds don't know that.
+/// Returns whether most boxes that overlap on the best axis overlap in space. Then a sweep along that axis is the
+/// fastest search, which thresholds don't know.
 fn lie_on_one_axis(boxes: &[Aabb]) -> bool {
     boxes.len() >= WORTH_AN_ESTIMATE && {
         let load = Load::estimate(boxes, None, None);

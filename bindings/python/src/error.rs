@@ -54,13 +54,10 @@ pub(crate) fn exception(py: Python<'_>, error: &Error, which: &str) -> PyErr {
             );
             instance(py, "TooManyPairsError", (text, limit))
         }
-        Error::Unavailable { ref algorithm, reason: Unavailable::TooFewCores { threads, most } } => failed(
-            py,
-            format!(
-                "{algorithm} needs {threads} threads, and {most} may be used; raise `threads=` up to the cores of \
-                 this machine, or name an algorithm with fewer"
-            ),
-        ),
+        Error::Unavailable { ref algorithm, reason: Unavailable::TooFewCores { threads, most } } => {
+            let fix = "raise `threads=` up to the cores of this machine, or name an algorithm with fewer";
+            failed(py, format!("{algorithm} needs {threads} threads, and {most} may be used; {fix}"))
+        }
         Error::OutOfMemory { what, elements } => pyo3::exceptions::PyMemoryError::new_err(format!(
             "no memory for {elements} {what}; bound the pairs with `limit=`, or give fewer boxes"
         )),

@@ -193,14 +193,12 @@ impl PyBroadPhase {
             Some(frames.find(boxes, ids, filter.as_ref()))
         })?;
         py.check_signals()?;
-        match found {
-            None => Err(unusable(
-                py,
-                "only one of two consecutive frames has ids; give them for each frame or for none, \
-                 or make a new BroadPhase",
-            )),
-            Some(found) => two_columns(py, found.map_err(|error| exception(py, &error, ""))?),
-        }
+        let Some(found) = found else {
+            let text = "only one of two consecutive frames has ids; give them for each frame or for none, or make a \
+                        new BroadPhase";
+            return Err(unusable(py, text));
+        };
+        two_columns(py, found.map_err(|error| exception(py, &error, ""))?)
     }
 
     /// Set which boxes may be a pair, from the next frame on. Without arguments every two may.

@@ -1,4 +1,4 @@
-//! What a class holds that searches and learns: behind a lock, made anew after a fork, saved at the end of a block.
+//! The searcher in a class that learns: behind a lock, made anew after a fork, saved at the end of a block.
 
 use crate::{PyDecision, PyTuning, Start, call, failed, start, with_cause};
 use pyo3::prelude::*;
@@ -24,7 +24,7 @@ pub(crate) trait Searcher: Send + Sync + Sized {
 
 /// A searcher, until it is closed.
 pub(crate) struct Held<T: Searcher> {
-    start: Start,
+    pub(crate) start: Start,
     state: Mutex<State<T>>,
 }
 
@@ -54,10 +54,6 @@ impl<T: Searcher> Held<T> {
         let searcher = make(start::adaptive(py, &start)?, &start);
         let state = State { pid: std::process::id(), searcher: Some(Arc::new(RwLock::new(searcher))) };
         Ok(Self { start, state: Mutex::new(state) })
-    }
-
-    pub(crate) fn start(&self) -> &Start {
-        &self.start
     }
 
     fn state(&self) -> MutexGuard<'_, State<T>> {

@@ -4,8 +4,8 @@
 /// several threads, each task may hold a list of up to the limit.
 const BYTES_A_PAIR: u64 = 256;
 
-/// Returns the default limit: one pair for each [`BYTES_A_PAIR`] of free memory. So a scene in which all boxes meet is
-/// an exception, not the end of the process. `None` if the system does not tell.
+/// Returns the default limit: one pair for each [`BYTES_A_PAIR`] of free memory. So a scene in which all boxes meet
+/// raises an exception and does not end the process. `None` if the system does not report its free memory.
 pub(crate) fn most_pairs() -> Option<usize> {
     let available = available(&std::fs::read_to_string("/proc/meminfo").ok()?)?;
     let free = cgroup_left().map_or(available, |left| left.min(available));

@@ -96,9 +96,9 @@ pub(crate) fn integers<'py>(
 /// Find all pairs of overlapping boxes.
 ///
 /// Boxes are closed: those that touch overlap. For consecutive frames use ``BroadPhase``, which is faster there. The
-/// memory and the work of a call stay for the next one, so the same boxes are found faster again. Chooses the algorithm
-/// by the tuning of this machine that ``predict`` or ``BroadPhase`` has saved, else by built-in thresholds. It measures
-/// nothing. ``last_decision`` returns the choice and its reason.
+/// memory and the work of a call stay for the next one, so the same boxes are found faster again. Chooses the
+/// algorithm by the tuning of this machine that ``predict`` or ``BroadPhase`` has saved, else by built-in thresholds.
+/// It measures nothing. ``last_decision`` returns the choice and its reason.
 ///
 /// Parameters
 /// ----------
@@ -280,10 +280,8 @@ pub(crate) fn pairs_between<'py>(
     }
     // As one list, in which each of the two has one owner: two boxes of it are no pair.
     if owner.is_some() {
-        return Err(unusable(
-            py,
-            "owner excludes algorithm and worlds in pairs_between; leave it out, or filter after",
-        ));
+        let text = "owner excludes algorithm and worlds in pairs_between; leave it out, or filter after";
+        return Err(unusable(py, text));
     }
     let mut joined: Cow<'_, [Aabb]> = Cow::Owned([&*grown_a, &*grown_b].concat());
     Aabb::check(&joined, 0).map_err(error)?;

@@ -13,7 +13,7 @@ const HEAD: &[u8] = b"sapwise space 2\n";
 pub(crate) fn reduced<'py>(py: Python<'py>, held: &Held<Space>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
     let written = held.read(py, |space| postcard::to_extend(space, HEAD.to_vec()))?;
     let bytes = written.map_err(|why| failed(py, format!("no snapshot of the space: {why}")))?;
-    let Start { threads, learning, exploring, limit, .. } = *held.start();
+    let Start { threads, learning, exploring, limit, .. } = held.start;
     let arguments = (PyBytes::new(py, &bytes), held.tuning(py)?, threads, learning, exploring, limit);
     Ok((py.import("sapwise._sapwise")?.getattr("restored_space")?, arguments.into_pyobject(py)?.into_any()))
 }

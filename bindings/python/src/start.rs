@@ -22,7 +22,7 @@ pub(crate) struct Start {
     /// A tuning of the caller's.
     pub(crate) tuning: Option<Tuning>,
     pub(crate) ordered: bool,
-    /// The most pairs, where the caller says so.
+    /// The most pairs, if the caller sets a limit.
     pub(crate) limit: Option<usize>,
 }
 
@@ -139,7 +139,7 @@ pub(crate) fn order(ordered: bool) -> PairOrder {
 
 /// Makes what always runs the algorithm of this name.
 pub(crate) fn only(name: &str, threads: Option<u32>) -> Result<Adaptive, Error> {
-    // Who names an algorithm may want a software adapter. On the CPU nobody waits for drivers.
+    // A caller that names an algorithm may want a software adapter. An algorithm on the CPU need not wait for drivers.
     let registry = if name.contains("@cpu") { on_cpu(threads) } else { with_gpus(threads, true) };
     let parsed = name.parse().map_err(|_| {
         let known: Vec<String> = registry.available().iter().map(|entry| entry.id.to_string()).collect();

@@ -23,7 +23,7 @@ type Handles<'py> = Bound<'py, PyArray1<u64>>;
 type Floats<'py> = Bound<'py, PyArray1<f32>>;
 type Hits<'py> = (Handles<'py>, Floats<'py>);
 
-/// How far away, and the body.
+/// A distance, and the body.
 type Hit = (f32, Handle);
 
 fn sorted(mut hits: Vec<Hit>) -> Vec<Hit> {

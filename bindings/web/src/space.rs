@@ -19,17 +19,17 @@ pub struct WebSpace(RefCell<Space>);
 
 /// Returns the error with handles as JavaScript sees them.
 fn failure(failed: Error) -> JsError {
-    match failed {
+    let text = match failed {
         Error::StaleHandle { handle } => {
             let bits = handle.to_bits();
-            JsError::new(&format!("handle {bits}n names no body of this space; it was removed, or is of another space"))
+            format!("handle {bits}n names no body of this space; it was removed, or is of another space")
         }
         Error::InvalidBody { handle, defect } => {
-            let bits = handle.to_bits();
-            JsError::new(&format!("the box for handle {bits}n {defect}; the body keeps its previous box"))
+            format!("the box for handle {}n {defect}; the body keeps its previous box", handle.to_bits())
         }
-        other => other.into(),
-    }
+        other => return other.into(),
+    };
+    JsError::new(&text)
 }
 
 fn list(pairs: &[(Handle, Handle)]) -> BigUint64Array {

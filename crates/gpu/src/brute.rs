@@ -38,7 +38,7 @@ impl Search for Brute {
         tiles * (tiles + 1) / 2
     }
 
-    /// As many tests in one submission as the other methods have; see [`params`](super::params).
+    /// Limits the tests of one submission to those of the other methods; see [`params`](super::params).
     fn most_blocks(&self) -> u32 {
         1 << 16
     }

@@ -1,4 +1,4 @@
-//! Counting sort by cell, which also makes the table of where each cell begins; see `shaders/cells.wgsl`.
+//! Counting sort by cell, which also makes the table of the begins of the cells; see `shaders/cells.wgsl`.
 
 use super::kernel::source;
 use super::params::CELLS_OF_BLOCK;
@@ -51,8 +51,8 @@ impl Cells {
         for list in [&mut self.ranks, &mut self.order, &mut self.sorted_keys] {
             grown |= list.ensure(gpu, n * 4)?;
         }
-        // There are about as many cells as boxes. Their exact number changes with the scene, and must not replace the
-        // buffer each time.
+        // The number of cells is about that of the boxes. It changes with the scene, which must not replace the buffer
+        // each time.
         let usual = (params.objects + params.objects / 4).div_ceil(CELLS_OF_BLOCK) + 1;
         let blocks = u64::from(params.cell_blocks.max(usual));
         grown |= self.table.ensure(gpu, blocks * u64::from(CELLS_OF_BLOCK) * 4)?;

@@ -18,7 +18,7 @@ const BEYOND: f64 = 2.0;
 /// The parts of an axis, ascending.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Parts {
-    /// Where each part begins, with the rank of the sampled box there. The last entry is where the last part ends.
+    /// Begin of each part, with the rank of the sampled box there. The last entry is the end of the last part.
     corners: [(f64, f64); PARTS + 1],
     count: usize,
 }
@@ -28,7 +28,7 @@ pub(super) struct Parts {
 #[repr(C)]
 pub(super) struct Segment {
     begin: f32,
-    /// Cells in a unit of length; 0 where there is one.
+    /// Cells in a unit of length; 0 if the part has one cell.
     per_length: f32,
     /// The number of its first cell.
     first: u32,

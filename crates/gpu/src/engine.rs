@@ -34,8 +34,8 @@ const BOXES_AT: u64 = 2048;
 const PAIRS_AT: u64 = 48;
 /// Most bytes of pairs in one download.
 const MOST_DOWNLOAD: u64 = 64 << 20;
-/// Pairs that are downloaded with the header, beyond the number of the previous frame. If there are more, a second
-/// submission gets them.
+/// Pairs that are downloaded with the header beyond the number of the previous frame. If there are more, a second
+/// submission downloads them.
 const SPARE_PAIRS: u64 = 256;
 
 /// A method on a GPU with all its buffers.
@@ -73,7 +73,7 @@ enum Home {
     Device(Sampler),
 }
 
-/// What the download is waiting for.
+/// The submission for which the download waits.
 #[derive(Debug, Default)]
 #[expect(clippy::large_enum_variant, reason = "there is one for each engine")]
 enum Pending {
@@ -353,7 +353,7 @@ impl Engine {
     fn number(&mut self, params: &mut Params) -> u64 {
         params.blocks = self.first_blocks(params.objects);
         params.capacity = self.output.capacity();
-        params.members = self.memberships.count().unwrap_or(0);
+        params.members = self.memberships.count.unwrap_or(0);
         params.submission = self.next_submission();
         self.search.blocks(params.objects) - u64::from(params.blocks)
     }

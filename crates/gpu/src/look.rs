@@ -1,4 +1,4 @@
-//! What a frame is planned by: statistics of a sample of its boxes.
+//! Statistics of a sample of boxes, by which a frame is planned.
 
 use super::division::Parts;
 use sapwise::internals::{SampledBoxes, SceneStats};

@@ -11,7 +11,7 @@ const TOGETHER: usize = 1 << 16;
 pub(super) struct Memberships {
     storage: Storage,
     /// Number of memberships; `None` if the kernels test none.
-    count: Option<u32>,
+    pub(super) count: Option<u32>,
     words: Vec<[u32; 4]>,
 }
 
@@ -36,10 +36,6 @@ impl Memberships {
         }
         self.count = Some(memberships.len() as u32);
         Ok(grown || before.is_none())
-    }
-
-    pub(super) fn count(&self) -> Option<u32> {
-        self.count
     }
 
     /// Returns the buffer that kernels test, if they do.

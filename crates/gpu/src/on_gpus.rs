@@ -13,7 +13,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Most boxes of a frame: a GPU has 31 bits for their numbers, and one for the owner.
 const MOST_OBJECTS: usize = 1 << 30;
 
-/// Most slabs that a GPU takes one after the other. If they overlap as much as that, more don't help.
+/// Most slabs that a GPU takes one after another. If so many don't suffice, the slabs overlap too much for more to
+/// help.
 const MOST_ROUNDS: usize = 64;
 
 /// Most threads that copy boxes to a GPU and pairs from it. On an NVIDIA H200 more copy no faster.

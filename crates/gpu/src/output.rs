@@ -34,8 +34,8 @@ impl Output {
         self.sums.ensure(gpu, (u64::from(blocks) + 1).next_multiple_of(COUNTS) * 4)
     }
 
-    /// Makes room for `pairs` pairs, or for as many as the GPU allows in one buffer. Returns whether the buffer was
-    /// replaced.
+    /// Makes room for `pairs` pairs, at most for those that the GPU allows in one buffer. Returns whether the buffer
+    /// was replaced.
     pub(super) fn ensure_pairs(&mut self, gpu: &Gpu, pairs: u64) -> Result<bool, GpuError> {
         let most = largest(gpu, wgpu::BufferUsages::STORAGE) / PAIR * PAIR;
         self.pairs.ensure(gpu, (pairs * PAIR).min(most))

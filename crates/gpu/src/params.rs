@@ -75,9 +75,9 @@ const MOST_SLOTS: f64 = 16_777_216.0;
 /// strip.
 const LARGE_LENGTHS: f64 = 16.0;
 
-/// Most candidates and nodes that the rows of one submission are tested with while they are counted. Writing may test
-/// as many again. An integrated GPU is assumed to test 10^10 a second, which makes a tenth of a second; drivers of
-/// desktops give up after 2 to 10 s.
+/// Most tests against candidates and nodes while the rows of one submission are counted. Writing may repeat them. An
+/// integrated GPU is assumed to make 10^10 tests a second, so these take a tenth of a second; drivers of desktops give
+/// up after 2 to 10 s.
 const MOST_TESTS: u32 = 1 << 30;
 
 /// Most tests of one row in a submission. lavapipe ends a loop after 65 535 turns.
@@ -151,7 +151,7 @@ impl Params {
         let (slots, strips) = (along.cells, across_u.cells * across_v.cells);
         let large_key = strips * slots;
         let rows = Self::rows(look, objects, a);
-        // Oversized boxes are few: they get an eighth as many cells as there are boxes.
+        // Oversized boxes are few: they get one cell for every eight boxes.
         let curve_bits = (objects.max(2).ilog2() - 1).saturating_sub(2).clamp(5, 16);
         let table = large_key + (1 << curve_bits) + 1;
         Self {
@@ -167,9 +167,9 @@ impl Params {
     }
 }
 
-/// Returns the cells of the curve's grid in a part of an axis, by the part's share of the boxes: a cluster then has
-/// as many cells in a world a million times its size. No cell is much shorter than a usual box: across a tower, tiny
-/// offsets would otherwise weigh as much as the place along it.
+/// Returns the cells of the curve's grid in a part of an axis. They follow the part's share of the boxes, so a cluster
+/// keeps its cells in a world a million times its size. No cell is much shorter than a usual box: otherwise tiny
+/// offsets across a tower would weigh the same as the place along it.
 fn curve_cells(width: f64, share: f64, extent: f64) -> f64 {
     (width * CELLS_OF_BOX / extent).min(share * (CURVE_CELLS - PARTS as f64))
 }

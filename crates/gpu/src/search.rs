@@ -1,4 +1,4 @@
-//! What an engine asks of a method.
+//! The interface between an engine and a method.
 
 use super::{Gpu, Look, Output, Pairing, Params};
 use sapwise::error::GpuError;

@@ -19,7 +19,7 @@ const ROW_WORDS: u64 = 3;
 /// Words for the pairs that a row keeps from counting to writing.
 const KEPT_WORDS: u64 = 8;
 
-/// The order of the boxes, and where the rows are searched.
+/// The method, which decides how boxes are sorted and how rows are searched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     Sap,
@@ -53,7 +53,7 @@ pub(super) struct Sorted {
     rows: Storage,
     kept: Storage,
     bound: Option<Bound>,
-    /// One for each buffer that may have the order.
+    /// `gather` bound to each buffer that may have the order.
     gathers: Vec<Bound>,
 }
 
@@ -66,23 +66,21 @@ enum Order {
 
 impl Sorted {
     pub(super) fn new(gpu: &Gpu, kind: Kind) -> Result<Self, GpuError> {
-        let (rows, keys, gather) = match kind {
-            Kind::Sap => (source::SAP, "sweep_keys", "gather"),
-            Kind::GridSap => (source::GRID_SAP, "cell_keys", "gather_cells"),
-            Kind::Bvh => (source::BVH, "curve_keys", "gather"),
+        let radix = || Sort::new(gpu).map(Order::Radix);
+        let tree = |of_large| Tree::new(gpu, of_large).map(Some);
+        let (rows, keys, gather, order, tree) = match kind {
+            Kind::Sap => (source::SAP, "sweep_keys", "gather", radix()?, None),
+            Kind::GridSap => {
+                (source::GRID_SAP, "cell_keys", "gather_cells", Order::Cells(Cells::new(gpu)?), tree(true)?)
+            }
+            Kind::Bvh => (source::BVH, "curve_keys", "gather", radix()?, tree(false)?),
         };
         Ok(Self {
             kind,
-            order: match kind {
-                Kind::GridSap => Order::Cells(Cells::new(gpu)?),
-                Kind::Sap | Kind::Bvh => Order::Radix(Sort::new(gpu)?),
-            },
+            order,
             make_keys: Kernel::new(gpu, source::KEYS, keys)?,
             gather: Kernel::new(gpu, source::GATHER, gather)?,
-            tree: match kind {
-                Kind::Sap => None,
-                Kind::GridSap | Kind::Bvh => Some(Tree::new(gpu, kind == Kind::GridSap)?),
-            },
+            tree,
             pairing: Pairing::new(gpu, rows)?,
             boxes: Storage::new(gpu, "sorted boxes")?,
             rows: Storage::new(gpu, "rows")?,

@@ -17,12 +17,12 @@ pub(super) struct Transfer {
     mapping: Arc<Mapping>,
 }
 
-/// How far a mapping is.
+/// State of a mapping.
 #[derive(Debug, Default)]
 struct Mapping {
     /// One of the constants below. The device sets it when the mapping is done.
     state: AtomicU8,
-    /// Who waits in a browser, which may not block.
+    /// The task that waits in a browser, which may not block.
     waiting: Mutex<Option<Waker>>,
 }
 
@@ -53,7 +53,7 @@ const UNMAPPED: u8 = 0;
 const ASKED: u8 = 1;
 const MAPPED: u8 = 2;
 
-/// A browser may say so before it reports that the device was lost.
+/// Message of a failed mapping. A browser may refuse one before it reports that the device was lost.
 const NOT_MAPPED: &str = "the driver refuses to map memory; the device may be lost";
 
 /// Bytes that a worker copies at once.

@@ -1,4 +1,4 @@
-//! What a benchmark sees of a frame. Programs set no watch, and pay one test for each call.
+//! A hook for benchmarks that time the parts of a frame. Programs set none, and pay one test for each call.
 
 /// Where a part of a frame has just ended.
 #[derive(Debug)]

@@ -138,9 +138,8 @@ fn a_gpu_that_does_not_answer_in_time_is_lost() {
     }
 }
 
-/// Keeps the queue of a GPU busy for well over a millisecond, however fast it is: 20 million operations, each of
-/// which depends on the previous one, take at least as many clock cycles. No watchdog of a driver ends so short a
-/// submission.
+/// Keeps the queue of a GPU busy for well over a millisecond, however fast it is: 20 million operations that depend on
+/// each other take at least 20 million clock cycles. No watchdog of a driver ends so short a submission.
 fn occupy(gpu: &Gpu) {
     const CHAIN: &str = "
         @group(0) @binding(0) var<storage, read_write> word: u32;

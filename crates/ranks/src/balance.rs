@@ -48,7 +48,7 @@ impl Balance {
     pub(crate) fn observe(&mut self, records: &[RankRecord]) {
         let boxes: u64 = records.iter().map(|r| r.boxes).sum();
         let before = *self.cut_at.get_or_insert(boxes);
-        // Else the scene has begun or mostly gone since the cuts.
+        // Otherwise most boxes have come or gone since the cuts.
         self.same_scene = boxes <= before.saturating_mul(2) && boxes >= before / 2;
         self.due |= !self.same_scene;
         let Some((slowest, even)) = times(records) else { return };
@@ -58,7 +58,7 @@ impl Balance {
             self.patience = if imbalance > 0.8 * was { (2.0 * self.patience).min(MOST_PATIENCE) } else { 1.0 };
         }
         let lost = slowest - even - TOLERATED * even;
-        // A scene that has become even by itself is forgiven.
+        // While the scene is even by itself, the sum halves in each frame.
         self.owed_ns = if lost > 0.0 { self.owed_ns + lost } else { self.owed_ns / 2.0 };
         let price = records.iter().map(|r| r.cut_ns).max().unwrap_or(0) as f64;
         if self.owed_ns > self.patience * price.max(even) {

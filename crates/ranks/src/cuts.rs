@@ -102,8 +102,8 @@ impl Cuts {
     /// Calls `visit` with each rank whose region a box overlaps, ascending. A box with a NaN may overlap none.
     #[inline]
     pub fn each_rank_of(&self, b: &Aabb, mut visit: impl FnMut(usize)) {
-        // A path has at most as many planes as the number of ranks has bits, and each leaves at most one branch for
-        // later.
+        // A path has at most one plane for each bit of the number of ranks, and each plane leaves at most one branch
+        // for later.
         let mut later = [(0_usize, 0_usize, 0_usize); usize::BITS as usize];
         let mut waiting = 0;
         let (mut plane, mut first, mut end) = (0, 0, self.regions.len());

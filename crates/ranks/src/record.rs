@@ -6,7 +6,7 @@ use sapwise::error::BoxDefect;
 /// Words of a record.
 pub(crate) const WORDS: usize = 8;
 
-/// What a rank reports about itself.
+/// The record of a rank.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct RankRecord {
     /// Boxes that it sends to the receiver of this record.

@@ -49,7 +49,7 @@ pub fn shares(times: &[[f64; FACTORS.len()]]) -> Vec<f64> {
 ///
 /// `predict` returns the time of a load.
 pub fn pair_cost(load: &Load, predict: impl Fn(&Load) -> f64) -> f64 {
-    // A large step, because the curve jumps where another algorithm becomes the cheapest.
+    // A large step, because the curve jumps when another algorithm becomes the cheapest.
     const MORE: f64 = 1.25;
     let now = predict(load);
     let objects = (f64::from(load.objects) * MORE).min(f64::from(u32::MAX)) as u32;

@@ -30,7 +30,7 @@ named! {
 }
 
 impl Course {
-    /// The scenario of its boxes.
+    /// Returns the scenario of its boxes.
     pub fn scenario(self) -> Scenario {
         match self {
             Self::Level => Scenario::Mixed,
@@ -39,7 +39,7 @@ impl Course {
         }
     }
 
-    /// How many of `objects` boxes are there in a frame.
+    /// Returns how many of `objects` boxes a frame has.
     pub fn boxes(self, frame: usize, objects: usize) -> usize {
         match self {
             Self::Level if frame < 150 => 40,
@@ -48,7 +48,7 @@ impl Course {
         }
     }
 
-    /// Steps that the scene makes after a frame.
+    /// Returns the number of steps that the scene makes after a frame.
     pub fn steps(self, frame: usize) -> usize {
         if self == Self::Fight && (200..400).contains(&frame) { 12 } else { 1 }
     }

@@ -155,7 +155,7 @@ fn those_that_never_move_are_named() {
         let mut moved = vec![false; scene.peak_objects()];
         for _ in 0..620 {
             scene.advance();
-            // The number of objects changes in `fragmentation`, and with it who is where.
+            // In `fragmentation` the number of objects changes, and with it the object at an index.
             for (moved, (now, then)) in moved.iter_mut().zip(scene.boxes().iter().zip(&began)) {
                 *moved |= now != then;
             }
@@ -259,13 +259,13 @@ fn far_objects_are_where_they_should_be_in_space_and_in_the_list() {
         (0..objects).filter(|&k| scene.boxes()[k].min.iter().any(|v| v.abs() > 2.0 * world)).collect()
     };
     let aliased: Vec<usize> = (0..1 << 17).filter(|k| k % 512 == 256).collect();
-    // One that is far by less than two worlds is rare.
+    // Few of them are less than two worlds away.
     let found = far(Scenario::Aliased, 1 << 17);
     assert!(found.len() > 250 && found.iter().all(|k| aliased.contains(k)), "{found:?}");
     for scenario in [Scenario::Parked, Scenario::Asleep] {
         let found = far(scenario, 5000);
         assert_eq!(found.len(), 100, "{scenario}");
-        // One in each run of fifty, and not always at the same place in it.
+        // Each run of fifty has one, at changing places in it.
         assert!(found.iter().enumerate().all(|(k, at)| at / 50 == k), "{scenario}");
         assert!(found.iter().any(|at| at % 50 < 10) && found.iter().any(|at| at % 50 >= 40), "{scenario}");
     }

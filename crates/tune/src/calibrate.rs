@@ -159,7 +159,7 @@ fn find(
     let predicted = predict(&model, hardware, &registry.available(), remarks);
     let Some((tuning, sound)) = predicted.filter(|(_, sound)| *sound || kept.is_none()) else { return kept };
     let measured = SystemTime::now();
-    // What follows from an impossible value is used, but not kept.
+    // A prediction from an impossible value is used, but not kept.
     if let Some(Err(e)) = file.as_ref().filter(|_| sound).map(|file| file.write(&tuning, measured)) {
         let cause = std::error::Error::source(&e).map_or(String::new(), |cause| format!(": {cause}"));
         remarks.push(format!("{e}{cause}"));

@@ -130,7 +130,7 @@ impl MethodModel {
         Self { residual: Vec::new(), ..self.clone() }
     }
 
-    /// What makes it unusable, if anything.
+    /// Returns what makes it unusable, if anything.
     fn defect(&self, places: usize) -> Option<String> {
         let axes = usize::from(self.backend == BackendClass::Cpu);
         if let Some(t) = self.terms.iter().find(|t| !t.scale.is_of(self.backend)) {

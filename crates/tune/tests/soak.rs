@@ -246,7 +246,8 @@ fn failures_lose_no_pair_and_leak_no_memory() {
     let mut lowest = isize::MAX;
     while tally.frames < frames {
         let length = (LIFE / 2 + below(&mut random, LIFE)).min(frames - tally.frames);
-        // In turns, so that a short run has enough of both. What the second kind is for happens between its programs.
+        // The two kinds take turns, so that a short run has enough of both. Files get damaged between the programs of
+        // the second kind.
         if tally.starts % 3 == 2 {
             kept.program(length.div_ceil(4), &mut random, &mut tally);
         } else {

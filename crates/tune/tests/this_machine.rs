@@ -276,7 +276,7 @@ fn the_background_makes_the_algorithms_once() {
     assert_eq!((origin(&adaptive), MADE.load(Relaxed)), (Origin::Probed, 1), "{:?}", adaptive.setup());
 }
 
-/// What most programs do, except for the folder and the time.
+/// Starts as most programs do, except for the folder and the time.
 #[test]
 fn a_program_without_a_registry_gets_our_algorithms() {
     let folder = tempfile::tempdir().unwrap();

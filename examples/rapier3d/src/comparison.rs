@@ -5,7 +5,7 @@ use sapwise::{Aabb, Adaptive, Body, Decision, Error, Handle, Registry, Space, Tu
 use std::collections::{HashMap, HashSet};
 use std::fmt;
 
-/// What rapier adds to every side of a fat AABB, as a share of its unit of length.
+/// Margin that rapier adds to every side of a fat AABB, as a share of its unit of length.
 ///
 /// `BroadPhaseBvh::CHANGE_DETECTION_FACTOR` of rapier 0.36, which is private. If another release has another value,
 /// [`Comparison::after_step`] reports a pair that differs.
@@ -39,16 +39,16 @@ struct Side {
     bodies: HashMap<ColliderHandle, Handle>,
 }
 
-/// What one step had.
+/// Counts of one step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Counts {
     /// Number of colliders, and of boxes.
     pub boxes: usize,
     /// Number of pairs of the space of own boxes.
     pub found: usize,
-    /// Those of `found` that belong to different bodies: the ones that may interact.
+    /// Number of pairs in `found` whose colliders belong to different bodies: those that may interact.
     pub own: usize,
-    /// Those of `found` that began in this step.
+    /// Number of pairs in `found` that began in this step.
     pub begun: usize,
     /// Pairs of the previous step that ended in this one.
     pub ended: usize,

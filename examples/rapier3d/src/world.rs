@@ -37,7 +37,7 @@ const APART: f32 = 1.5;
 /// Share of the smallest pieces that are debris: they collide with everything but each other, as games have it.
 const DEBRIS: f32 = 0.5;
 
-/// What a simulation is made from. The same settings give the same boxes in every step, on one machine and build.
+/// Settings of a simulation. The same settings give the same boxes in every step, on one machine and build.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settings {
     /// The most bodies at once, those that never move left out.
@@ -79,24 +79,24 @@ impl World {
             fixed(Vector::new(away, WALL / 2.0, 0.0), slab(0.5, WALL / 2.0, PIT + 1.0));
             fixed(Vector::new(0.0, WALL / 2.0, away), slab(PIT + 1.0, WALL / 2.0, 0.5));
         }
-        // Pieces get smaller until the whole cubes can be as many bodies as there may be.
+        // As few generations as give all the bodies that there may be.
         let most = |generations: &u32| WHOLE << (3 * generations) >= settings.bodies;
         let generations = (1..8).find(most).unwrap_or(8);
         Self { physics, settings, random: Random::new(settings.seed), cubes: VecDeque::new(), generations, step: 0 }
     }
 
-    /// What rapier knows.
+    /// Returns the state of rapier.
     pub fn physics(&self) -> &PhysicsWorld {
         &self.physics
     }
 
-    /// Bodies that move.
+    /// Returns the number of bodies that move.
     pub fn bodies(&self) -> usize {
         self.cubes.len()
     }
 
-    /// What the program does between two steps: it drops whole cubes, breaks those that were hit hard or whose turn
-    /// it is, and clears the oldest away.
+    /// Does what the program does between two steps: drops whole cubes, breaks those that were hit hard or whose turn
+    /// it is, and removes the oldest.
     pub fn prepare_step(&mut self) {
         let at = self.step % CYCLE;
         let burst = at % BURST == BURST - 1;
@@ -125,13 +125,13 @@ impl World {
         }
     }
 
-    /// One step of rapier, of a sixtieth of a second.
+    /// Makes one step of rapier, of a sixtieth of a second.
     pub fn step(&mut self) {
         self.physics.step();
         self.step += 1;
     }
 
-    /// The bodies whose velocity a contact of the last step changed by more than [`HARD`].
+    /// Returns the bodies whose velocity a contact of the last step changed by more than [`HARD`].
     fn hit_hard(&self) -> HashSet<RigidBodyHandle> {
         let mut hard = HashSet::new();
         for pair in self.physics.narrow_phase.contact_pairs() {
@@ -146,7 +146,7 @@ impl World {
         hard
     }
 
-    /// Whole cubes above the pit, each a body of eight colliders: its octants, which touch each other.
+    /// Drops whole cubes into the pit, each a body of eight colliders: its octants, which touch each other.
     fn drop_whole(&mut self) {
         let count = WHOLE.min(self.settings.bodies);
         self.clear_to(self.settings.bodies - count);
@@ -169,7 +169,7 @@ impl World {
         }
     }
 
-    /// Eight pieces in the place of a cube that is no longer among `cubes`.
+    /// Replaces a cube by eight pieces. It is no longer among `cubes`.
     fn shatter(&mut self, cube: Cube) {
         let Some(whole) = self.physics.remove_body(cube.body) else { return };
         let half = cube.half / 2.0;
@@ -205,7 +205,7 @@ impl World {
     }
 }
 
-/// The corners of a cube of half edge 1 around the origin.
+/// Returns the corners of a cube of half edge 1 around the origin.
 fn octants() -> impl Iterator<Item = Vector> {
     let side = |corner: u8, bit: u8| if corner >> bit & 1 == 1 { 1.0 } else { -1.0 };
     (0..8).map(move |corner| Vector::new(side(corner, 0), side(corner, 1), side(corner, 2)))

@@ -17,23 +17,23 @@ const ROUNDS: usize = 7;
 const FEWEST: usize = 3;
 /// Warm-up frames of an incremental algorithm, as in a probe by the command.
 const WARM_UP: usize = 24;
-/// Time of a scenario, and the growth of the time from one size to the next that is reckoned with.
+/// Time limit of a scenario, and the assumed growth of the time from one size to the next.
 const SCENARIO_MS: f64 = 14_000.0;
 const GROWTH: f64 = 4.0;
-/// An algorithm leaves a scenario at this many times the best, from a number of objects on; `brute` from a later one,
-/// since the paper's crossovers need its curve.
+/// From `JUDGED_FROM` objects on, an algorithm leaves a scenario if it takes this many times the best. `brute` stays
+/// until `BRUTE_FROM`, because the paper's crossovers need its curve.
 const HOPELESS: f64 = 8.0;
 const JUDGED_FROM: u32 = 1000;
 const BRUTE_FROM: u32 = 3000;
-/// Objects in all frames of a point, about.
+/// Approximate number of objects in all frames of a point.
 const OBJECTS: usize = 20_000;
 const MOST_PAIRS: usize = 16 << 20;
 
-/// An algorithm on the GPU is out if it is hopeless and a frame takes this long: below, that may be the way there and
-/// back alone, which more objects are worth.
+/// An algorithm on the GPU leaves only if a frame takes this long too. A shorter frame may be mostly the transfers,
+/// which pay off with more objects.
 const GPU_NS: f64 = 20e6;
 
-/// What runs.
+/// An algorithm and where it runs.
 enum Algorithm {
     Cpu(Box<dyn BroadPhase>),
     Gpu(AsyncBroadPhase),
@@ -57,7 +57,7 @@ pub(super) struct Sweep {
     shuffle: Random,
     /// One for each algorithm; new ones for each scenario.
     racers: Vec<Racer>,
-    /// Frames of the point, visited to and fro, so that boxes never jump.
+    /// Frames of the point, visited forth and back, so that boxes never jump.
     frames: Vec<Vec<Aabb>>,
     pairs: Pairs,
     load: Load,

@@ -20,7 +20,7 @@ impl Engine {
             let header = self.header_of(&frame).await?;
             let total = header.total();
             all += total;
-            if pairs.is_too_small_for(total, self.memberships.count().is_some()) {
+            if pairs.is_too_small_for(total, self.memberships.count.is_some()) {
                 // More than the caller wants: they stay on the GPU.
                 pairs.exceed();
             } else {
@@ -31,7 +31,7 @@ impl Engine {
             }
             self.go_on(frame, &header, 0)?;
         }
-        // Pairs over the limit were not stored, and room for as many may not be had.
+        // Pairs over the limit were not stored, and there may be no memory for them.
         if !pairs.is_over() {
             self.expected = all;
         }
@@ -111,7 +111,7 @@ impl Engine {
         if header.ran == submission { Ok(header) } else { Err(self.gpu.inert()) }
     }
 
-    /// Adds `total` pairs to the list: those that came with the header, then the others in as many steps as needed.
+    /// Adds `total` pairs to the list: those that came with the header, then the others in further downloads.
     async fn fetch(
         &mut self,
         frame: &mut Frame,
@@ -210,7 +210,7 @@ impl Engine {
         if count > 0 {
             let view = self.download.readable(&self.gpu, PAIRS_AT..PAIRS_AT + count * PAIR)?;
             let list: &[[u32; 2]] = bytemuck::cast_slice(&view);
-            pairs.extend(list, workers, self.memberships.count().is_some())?;
+            pairs.extend(list, workers, self.memberships.count.is_some())?;
             self.gpu.ends("reading out", Place::Host);
         }
         Ok(())

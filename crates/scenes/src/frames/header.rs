@@ -154,7 +154,7 @@ mod tests {
         for at in 0..file.len() {
             for byte in 0..=255 {
                 let old = std::mem::replace(&mut file[at], byte);
-                // Whatever comes of it, it is no panic.
+                // The result may be anything but a panic.
                 let _ = Header::read(&mut &file[..]);
                 file[at] = old;
             }

@@ -197,7 +197,7 @@ fn absent_boxes_stand_at_the_end_of_a_frame_only() {
     };
     let text = told(&file("(2, 3, 6)", &[one, nan, nan, one, nan, one]).unwrap_err());
     assert!(text.contains("frame 1: row 1 is NaN, and row 2 is not"), "{text}");
-    // In a file of one frame a row of NaN is no absent box but a mistake, which the algorithms tell.
+    // In a file of one frame a row of NaN is a mistake, which the algorithms report, and no absent box.
     let single = file("(2, 6)", &[one, nan]).unwrap();
     assert_eq!(single.objects(), 2);
     let text = single.check().unwrap_err().to_string();

@@ -60,7 +60,7 @@ impl<W: Write> FrameWriter<W> {
     /// Ends the stream and returns the writer, which is not flushed.
     ///
     /// # Errors
-    /// [`io::ErrorKind::InvalidInput`] where frames are missing.
+    /// [`io::ErrorKind::InvalidInput`] if frames are missing.
     pub fn finish(self) -> io::Result<W> {
         if self.frames > 0 {
             return Err(invalid(format!("{} frames are missing that were announced", self.frames)));

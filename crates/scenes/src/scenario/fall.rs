@@ -73,7 +73,7 @@ impl Fall {
         }
         let fallen = |time: u64| 0.5 * ACCELERATION * (time * time) as f32;
         if fallen(time - 1) > HEIGHT + self.layers as f32 {
-            // The last object had landed a frame ago.
+            // All objects have landed in an earlier frame.
             return;
         }
         let fallen = fallen(time);

@@ -9,7 +9,7 @@ use super::rng::{Powers, Rng, cube_root};
 use super::walk::{fly, reflect};
 use sapwise::Aabb;
 
-/// Cubes at the beginning of a cycle, or the peak where that is lower.
+/// Cubes at the beginning of a cycle, or the peak if that is lower.
 const START: usize = 10;
 
 /// The number of objects through a cycle: a frame, and the logarithm of the number as a share of the way from start
@@ -95,7 +95,7 @@ impl Fragmentation {
         }
     }
 
-    /// Moves all cubes, or begins a cycle; splits or merges them until there are as many as `frame` asks for; writes
+    /// Moves all cubes, or begins a cycle; splits or merges cubes until their number is the target of `frame`; writes
     /// the boxes.
     pub(super) fn advance(&mut self, frame: u64, rng: &mut Rng, boxes: &mut Vec<Aabb>) {
         let frame = frame % Scenario::FRAGMENTATION_FRAMES;
@@ -114,7 +114,7 @@ impl Fragmentation {
         boxes.extend(self.cubes.iter().map(|cube| Aabb::cube(cube.centre, cube.half)));
     }
 
-    /// How many cubes there are in a frame of the cycle.
+    /// Returns the number of cubes in a frame of the cycle.
     fn target(&self, frame: u64) -> usize {
         let at = COURSE.partition_point(|&(f, _)| f <= frame).clamp(1, COURSE.len() - 1);
         let ((f0, u0), (f1, u1)) = (COURSE[at - 1], COURSE[at]);
@@ -162,7 +162,7 @@ impl Fragmentation {
         self.cubes[at].half = cube_root(removed + volume(self.cubes[at])) as f32;
     }
 
-    /// The index at the cursor, which goes round the first `objects`, and moves the cursor on.
+    /// Returns the index at the cursor, which goes round the first `objects`, and advances the cursor.
     fn next(&mut self, objects: usize) -> usize {
         let at = if self.cursor < objects { self.cursor } else { 0 };
         self.cursor = at + 1;

@@ -62,7 +62,7 @@ impl Rng {
 
     /// Three numbers of mean 0 and variance 1, each the sum of twelve uniform ones less six (Irwin and Hall).
     ///
-    /// Within 6 of the mean; close to a Gaussian everywhere but in the tails beyond 3.
+    /// At most 6 from the mean; close to a Gaussian except in the tails beyond 3.
     pub(super) fn gauss3(&mut self) -> [f32; 3] {
         let mut sum = [0.0_f32; 3];
         for _ in 0..12 {

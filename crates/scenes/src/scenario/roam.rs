@@ -13,7 +13,7 @@ const STEP: f32 = 0.05;
 const JUMP_FRAMES: u64 = 30;
 /// Half the edge of a cube.
 const HALF: f32 = 0.5;
-/// Shapes of beams. Their lengths are spread evenly, so that each seed has as many pairs.
+/// Shapes of beams. Their lengths are spread evenly, so that all seeds have about the same number of pairs.
 const BEAMS: usize = 240;
 /// Shapes of buildings.
 const BUILDINGS: usize = 240;
@@ -238,7 +238,7 @@ impl Roam {
         Self::placed(objects, vec![Kind::cubes([0.1; 3])], rng, place).shuffled(rng)
     }
 
-    /// Boxes far apart in the middle of each of 256 equal parts of the list, where an evenly spaced sample looks.
+    /// Boxes far apart in the middle of each of 256 equal parts of the list: those that an evenly spaced sample takes.
     pub(super) fn aliased(objects: usize, rng: &mut Rng) -> Self {
         let wall = wall(objects);
         // A power of two: for 2^17 objects the special ones have the indices 256 modulo 512.
@@ -261,7 +261,7 @@ impl Roam {
     pub(super) fn sheets(objects: usize, rng: &mut Rng) -> Self {
         let wall = cube_root(objects as f64) as f32;
         let gap = 2.0 * wall / objects.max(1) as f32;
-        // As many pairs per object as the mean thickness has gaps: 0.1.
+        // Pairs per object equal the mean thickness in gaps: 0.1.
         let sheet = |thickness: f32| Kind {
             half: [wall, wall, 0.5 * thickness * gap],
             walls: [0.0, 0.0, wall],

@@ -17,9 +17,9 @@ pub(super) struct Walk {
     step: f32,
     /// Objects at the head of the list that never move.
     fixed: usize,
-    /// One object of this many moves in a frame.
+    /// In a frame, one object in this many moves.
     sparsity: usize,
-    /// Objects that others replace in a frame, all of one size.
+    /// Number of objects that are replaced in a frame, all of one size.
     replaced: usize,
 }
 

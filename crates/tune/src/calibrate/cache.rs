@@ -56,7 +56,7 @@ impl CacheFile {
         let mut temporary = builder.tempfile_in(folder)?;
         // Without a sync: measuring again after a power failure costs less than a sync in every session.
         temporary.write_all(text.as_bytes())?;
-        // What frames have taught does not make the measurement younger.
+        // Learning from frames does not make the measurement younger.
         temporary.as_file().set_modified(measured)?;
         temporary.persist(&self.path).map_err(|failed| failed.error)?;
         Ok(())

@@ -67,7 +67,7 @@ fn a_model_is_read_without_the_notes_of_its_training() {
     assert_eq!(model(&text).unwrap(), built_in);
     let read = Format::MODEL.read::<Model>(include_str!("../../../../models/default.json")).unwrap();
     assert!(read.skipped.is_empty());
-    // What the build shortened.
+    // The build has only removed white space.
     assert_eq!(read.value, built_in);
 }
 

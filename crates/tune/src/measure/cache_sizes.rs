@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 pub(super) struct Cache {
     pub(super) level: u8,
     pub(super) bytes: u64,
-    /// How many of them the machine has, as far as known: a socket of several dies has one last-level cache on each.
+    /// Known number of them in the machine: a socket of several dies has one last-level cache on each.
     pub(super) instances: u64,
 }
 

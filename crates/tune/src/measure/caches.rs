@@ -11,8 +11,8 @@ use super::{Options, cache_sizes, filled, memory};
 use crate::hardware::{Parameter, ParameterId};
 use sapwise::internals::splitmix;
 
-/// Sets of up to so many bytes are walked once, untimed, before their samples. A lap of a larger one takes longer
-/// than its samples.
+/// Largest set that is walked once, untimed, before its samples, in bytes. A lap of a larger one takes longer than its
+/// samples.
 const WALKED_BYTES: usize = 64 << 20;
 
 /// The largest working set of a brief run.
@@ -95,7 +95,7 @@ fn walk<'a>(mut at: Option<&'a Line<'a>>, steps: usize) -> Option<&'a Line<'a>> 
     black_box(at)
 }
 
-/// Nanoseconds a load, over at least `slice`, and where the walk ended.
+/// Returns the nanoseconds of a load, averaged over at least `slice`, and the line at which the walk ended.
 fn sample_ns<'a>(mut at: Option<&'a Line<'a>>, slice: Duration) -> (f64, Option<&'a Line<'a>>) {
     const STEPS: usize = 16_384;
     let start = Instant::now();

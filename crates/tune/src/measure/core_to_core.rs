@@ -1,4 +1,4 @@
-//! How long it takes a core to see what another core wrote.
+//! Time until a core sees what another core wrote.
 //!
 //! The hypervisor of one machine moved its two virtual cores between one group of cores that shares a cache (23 ns)
 //! and two groups (175 ns), for seconds or minutes. The bandwidth of both was 88 GB/s or 52 GB/s accordingly, and two

@@ -8,14 +8,16 @@ use std::time::{Duration, Instant};
 /// Ticks a second of `/proc/stat`: `USER_HZ`, 100 on every Linux architecture that Rust's standard library supports.
 const TICKS_PER_SECOND: f64 = 100.0;
 
-/// Ticks, over all CPUs, that a window must hold: with fewer, the rounding of two counters alone exceeds the threshold.
+/// Ticks, over all CPUs, that a window must hold: with fewer, the rounding of two counters alone exceeds the
+/// threshold.
 const TICKS_PER_WINDOW: f64 = 40.0;
 
 /// Watches what other programs take while the caller measures.
 #[derive(Debug)]
 pub struct Watch {
-    before: Option<Counters>,
-    began: Instant,
+    /// `None` if foreign load is unknown here.
+    pub(super) before: Option<Counters>,
+    pub(super) began: Instant,
 }
 
 impl Watch {
@@ -32,27 +34,18 @@ impl Watch {
 
     /// Whether [`shortest`](Self::shortest) has passed.
     pub fn is_long_enough(&self) -> bool {
-        self.elapsed() >= self.shortest()
+        self.began.elapsed() >= self.shortest()
     }
 
     /// Returns the share of the CPU, 0 to 1, that other programs have taken since the begin. `None` if unknown.
     pub fn foreign_load(&self) -> Option<f64> {
-        self.before.zip(Counters::now()).map(|(before, now)| before.foreign_share(now, self.elapsed()))
-    }
-
-    pub(super) fn elapsed(&self) -> Duration {
-        self.began.elapsed()
-    }
-
-    /// Whether foreign load is known here.
-    pub(super) fn is_known(&self) -> bool {
-        self.before.is_some()
+        self.before.zip(Counters::now()).map(|(before, now)| before.foreign_share(now, self.began.elapsed()))
     }
 }
 
 /// Counters of the kernel since its start, in ticks.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Counters {
+pub(super) struct Counters {
     cpus: u32,
     /// Idle time over all CPUs. Time that the hypervisor steals is not included, so it counts as foreign.
     idle: u64,

@@ -1,4 +1,4 @@
-//! What it costs to split work over all usable cores and wait for it.
+//! Cost of splitting work over all usable cores and waiting for it.
 //!
 //! Measured through the same phase by which the algorithms on several cores split their work: the calling thread
 //! works, and helpers join in, each bound to a core of its own. The bodies have a known length, which is subtracted.

@@ -45,14 +45,14 @@ impl Plan<'_> {
             let mut rows = Vec::new();
             loop {
                 rows.push(sample()?);
-                let enough = watch.is_long_enough() && (watch.is_known() || rows.len() >= self.samples);
+                let enough = watch.is_long_enough() && (watch.before.is_some() || rows.len() >= self.samples);
                 if enough || start.elapsed() >= self.limit || self.options.is_stopped() {
                     break;
                 }
             }
             windows.push(Window { rows, foreign_load: watch.foreign_load() });
             let clean: usize = windows.iter().filter(|w| w.load() <= Parameter::SPOILING).map(|w| w.rows.len()).sum();
-            let over = start.elapsed() + watch.elapsed() > self.limit;
+            let over = start.elapsed() + watch.began.elapsed() > self.limit;
             if clean >= self.samples || over || self.options.is_stopped() {
                 return Ok(Samples::keep(windows, self.samples));
             }
@@ -82,7 +82,8 @@ struct Samples<const N: usize> {
 }
 
 impl<const N: usize> Samples<N> {
-    /// Keeps every clean window, and the least spoiled others until `wanted` samples are kept; in order of measurement.
+    /// Keeps every clean window, and the least spoiled others until `wanted` samples are kept; in order of
+    /// measurement.
     fn keep(windows: Vec<Window<N>>, wanted: usize) -> Self {
         let mut loads: Vec<f64> = windows.iter().flat_map(|w| w.rows.iter().map(|_| w.load())).collect();
         loads.sort_unstable_by(f64::total_cmp);

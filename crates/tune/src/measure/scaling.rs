@@ -1,4 +1,4 @@
-//! How much more work several threads do than one.
+//! Work of several threads over work of one.
 //!
 //! Hyper-threads, shared power and a quota all show as less than one core's work a thread.
 

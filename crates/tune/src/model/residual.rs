@@ -1,4 +1,4 @@
-//! What the physical terms of a method leave unexplained, shared by groups of timings.
+//! The part of a method's time that its physical terms do not explain, shared by groups of timings.
 //!
 //! A Gaussian process over the load for each group, a host's SIMD level: the more alike two levels are, the more alike
 //! their residuals. A new machine gets the weighted sum of all groups. Far from all loads of the training it is zero,
@@ -8,8 +8,8 @@ use super::PredictError;
 use super::needed::needed;
 use crate::hardware::{Hardware, ParameterId};
 
-/// Standard deviation that all groups share, and that alike groups share, as natural logarithms. Chosen, as the lengths
-/// below, with the regrets of the six hosts of the training in sight (`docs/limitations.md`).
+/// Standard deviation that all groups share, and that alike groups share, as natural logarithms. Chosen, as the
+/// lengths below, with the regrets of the six hosts of the training in sight (`docs/limitations.md`).
 const SHARED_LN: f64 = 0.2;
 const ALIKE_LN: f64 = 0.15;
 /// Length over which groups are alike, in natural logarithms of SIMD lanes.
@@ -51,7 +51,7 @@ impl GroupResidual {
         sum
     }
 
-    /// What makes the residual of a method unusable, if anything.
+    /// Returns what makes the residual of a method unusable, if anything.
     pub(super) fn defect(groups: &[Self], places: usize, axes: usize) -> Option<String> {
         if let Some(group) = groups.iter().find(|g| g.weights.len() != places) {
             Some(format!("its residual has {} weights for {places} places", group.weights.len()))

@@ -12,9 +12,9 @@ use std::time::Duration;
 /// A cache folder that lasts from start to start, as that of a user does.
 pub(crate) struct Kept {
     folder: tempfile::TempDir,
-    /// Files that were made unreadable, of which the next start has to tell.
+    /// Files that were made unreadable, which the next start must report.
     damaged: Vec<PathBuf>,
-    /// Number of programs that have kept a tuning, or failed to.
+    /// Number of programs that have saved a tuning, or failed to.
     turns: u64,
     cores: u32,
 }
@@ -27,7 +27,8 @@ impl Kept {
     /// One program from start to end. Then something happens to its file.
     pub(crate) fn program(&mut self, frames: u64, random: &mut Random, tally: &mut Tally) {
         let mut machine = Machine::new(random);
-        // Three programs on as many cores, which have one file. The folder of the second is occupied.
+        // Three programs in turn use the same number of cores, and so the same file. The folder of the second is
+        // occupied.
         if self.turns.is_multiple_of(3) {
             self.cores = machine.cores;
         }
@@ -41,7 +42,7 @@ impl Kept {
             .background(below(random, 4) == 0)
             .cache(Some(cache))
             .registry(Arc::new(registry(machine.cores, &machine.slot)))
-            // As briefly as possible: nobody looks at the values.
+            // As briefly as possible: no assertion uses the values.
             .measure(Some(Duration::ZERO));
         let mut adaptive = sapwise_tune::for_this_machine(&options).unwrap();
         life(&mut adaptive, &mut machine, frames, random, tally);
@@ -51,8 +52,8 @@ impl Kept {
             life(&mut adaptive, &mut machine, 1, random, tally);
         }
         let setup = adaptive.setup();
-        // Of so brief a measurement on a busy machine some figure may be none that can be. What is predicted without it
-        // is not kept.
+        // So brief a measurement on a busy machine may yield an impossible value. The prediction without it is not
+        // saved.
         let left_out = setup.remarks.iter().any(|r| r.contains("it is left out"));
         let Some(file) = setup.file.clone() else {
             assert!(left_out, "nothing is kept, and nothing was told: {setup:?}");
@@ -79,7 +80,7 @@ impl Kept {
         if file.is_file() && !spared {
             self.damage(&file, random);
         } else if file.is_dir() && below(random, 2) == 0 {
-            // Nobody but the user clears this away.
+            // Only a user removes such a folder.
             fs::remove_dir(&file).unwrap();
             self.damaged.retain(|d| *d != file);
         }
@@ -99,7 +100,7 @@ impl Kept {
                 fs::write(file, bytes).unwrap();
                 self.damaged.push(file.to_owned());
             }
-            // May leave a file that can be read: another figure, or a sound one of another key.
+            // The file may stay readable: with another number, or with another known key.
             2 => {
                 let at = below(random, bytes.len() as u64) as usize;
                 bytes[at] ^= 1 << below(random, 8);

@@ -1,4 +1,4 @@
-//! What every family of GPU measurements needs: buffers, kernels, timed submissions, and work of the right amount.
+//! Shared by the families of GPU measurements: buffers, kernels, timed submissions, and calibrated amounts of work.
 
 use std::time::{Duration, Instant};
 
@@ -18,11 +18,7 @@ pub(super) struct Bench<'a> {
     pub(super) options: &'a Options,
 }
 
-impl<'a> Bench<'a> {
-    pub(super) fn new(gpu: &'a Gpu, options: &'a Options) -> Self {
-        Self { gpu, options }
-    }
-
+impl Bench<'_> {
     /// Whether a program on the CPU acts as the GPU. It is hundreds of times slower and has no clock of its own.
     pub(super) fn is_software(&self) -> bool {
         self.gpu.identity().kind == GpuKind::Software

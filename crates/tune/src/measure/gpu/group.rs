@@ -1,4 +1,4 @@
-//! What GPUs do together over what they do alone: they may share a bus, power, or the cores of one CPU.
+//! Speed of several GPUs together over their speed alone: they may share a bus, power, or the cores of one CPU.
 
 use std::sync::Barrier;
 use std::time::{Duration, Instant};
@@ -18,7 +18,7 @@ const UPLOAD_BYTES: u64 = 8 << 20;
 const ROUND_TRIPS: u32 = 10;
 
 pub(super) fn measure(gpus: &[Gpu], options: &Options) -> Vec<Parameter> {
-    let group = Group { benches: gpus.iter().map(|gpu| Bench::new(gpu, options)).collect(), options };
+    let group = Group { benches: gpus.iter().map(|gpu| Bench { gpu, options }).collect(), options };
     [
         or_missing(&[GpuParameterId::GroupUploadRatio], group.uploads()),
         or_missing(&[GpuParameterId::GroupRoundTripRatio], group.round_trips()),
@@ -38,7 +38,7 @@ impl Group<'_> {
         if self.benches.iter().any(Bench::is_software) { software } else { hardware }
     }
 
-    /// How long each GPU works for one rate.
+    /// Returns the time for which each GPU works for one rate.
     fn slice(&self) -> Duration {
         Duration::from_millis(if self.options.brief { 1 } else { self.pick(6, 20) })
     }

@@ -1,4 +1,4 @@
-//! What it costs to ask a GPU for anything: three times that differ by orders of magnitude.
+//! Latencies of a GPU: three times that differ by orders of magnitude.
 
 use std::time::Instant;
 
@@ -18,7 +18,8 @@ const CHAIN_SOFTWARE: u32 = 50;
 pub(super) const NAMES: [GpuParameterId; 3] =
     [GpuParameterId::RoundTripNs, GpuParameterId::DispatchNs, GpuParameterId::ReadBackNs];
 
-/// Proves that the GPU executes what it is given. Other failures are no error here; they show in what is measured next.
+/// Proves that the GPU executes what it is given. Other failures are no error here; they show in what is measured
+/// next.
 ///
 /// # Errors
 /// [`GpuErrorKind::Inert`] if the GPU executes nothing.

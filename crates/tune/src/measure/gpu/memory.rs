@@ -51,14 +51,11 @@ pub(super) fn measure(bench: &Bench<'_>, heaps: &[u64]) -> Result<Vec<Parameter>
     let read_count = calibrate(target, MOST_COMMANDS, reads)?;
     let copy_count = calibrate(target, MOST_COMMANDS, copies)?;
     let mib = bytes >> 20;
-    let methods = [
-        format!(
-            "kernel that reads {mib} MiB of random data, vectors of 16 bytes, many dispatches in one submission, by \
-             the wall clock"
-        ),
-        format!("copy command from one buffer of {mib} MiB to another, read and written bytes counted"),
-    ];
-    let [read_method, copy_method] = methods;
+    let read_method = format!(
+        "kernel that reads {mib} MiB of random data, vectors of 16 bytes, many dispatches in one submission, by the \
+         wall clock"
+    );
+    let copy_method = format!("copy command from one buffer of {mib} MiB to another, read and written bytes counted");
     bench.options.plan(9, bench.pick(250, 500)).measure([(NAMES[0], read_method), (NAMES[1], copy_method)], || {
         let rate = |count: u32, time| per_ns(bytes as f64 * f64::from(count), time);
         Ok([rate(read_count, reads(read_count)?), 2.0 * rate(copy_count, copies(copy_count)?)])

@@ -37,7 +37,7 @@ pub fn gpu(gpus: &Gpus, index: u32, options: &Options) -> Result<GpuHardware, Gp
     let adapter = gpus.adapter(index);
     let opened = if adapter.is_some() { gpus.open_another(index)? } else { gpus.open(index)? };
     let heaps = reported::heaps(adapter);
-    let bench = Bench::new(&opened, options);
+    let bench = Bench { gpu: &opened, options };
     let inert = latency::proof(&bench).err();
     let executes = if inert.is_none() { 1.0 } else { 0.0 };
     let source = "three dependent additions by a kernel, read back before anything is timed";
@@ -59,7 +59,7 @@ pub fn gpu(gpus: &Gpus, index: u32, options: &Options) -> Result<GpuHardware, Gp
 /// The parameters that take the GPU's time.
 fn timed(opened: &Gpu, options: &Options, heaps: &[u64], began: Instant) -> Vec<Parameter> {
     let part = |parts: usize, names: &[GpuParameterId], measure: &dyn Fn(&Bench<'_>) -> bench::Result<_>| {
-        or_missing(names, measure(&Bench::new(opened, &options.share(began, parts))))
+        or_missing(names, measure(&Bench { gpu: opened, options: &options.share(began, parts) }))
     };
     // Arithmetic is the shortest part and takes the time that the others leave.
     [
@@ -86,7 +86,7 @@ pub fn gpu_group(gpus: &Gpus, indices: &[u32], options: &Options) -> Result<GpuG
         return Err(GpuError::new(GpuErrorKind::NotFound, "a group needs two GPUs or more"));
     }
     let opened = indices.iter().map(|&index| gpus.open_another(index)).collect::<Result<Vec<Gpu>, _>>()?;
-    opened.iter().for_each(|gpu| warm_up(&Bench::new(gpu, options)));
+    opened.iter().for_each(|gpu| warm_up(&Bench { gpu, options }));
     Ok(GpuGroup::new(indices, group::measure(&opened, options)))
 }
 

@@ -1,4 +1,4 @@
-//! What NVIDIA's management library reports. It comes with the driver and is loaded at run time.
+//! Parameters from NVIDIA's management library, which comes with the driver and is loaded at run time.
 
 use nvml_wrapper::Nvml;
 use nvml_wrapper::enum_wrappers::device::Clock;
@@ -17,13 +17,10 @@ pub(super) fn query(pci: &str) -> Result<Vec<Parameter>, String> {
     let processors = cores.zip(capability).and_then(|(cores, of)| processors(cores, of.major, of.minor));
     // The highest of a few: the clock rises while the work runs.
     let mhz = (0..8).filter_map(|_| device.clock_info(Clock::SM).ok()).max().filter(|&mhz| mhz > 0);
+    let ghz = mhz.map(|mhz| f64::from(mhz) / 1000.0);
     let found = [
         (GpuParameterId::MemoryBytes, device.memory_info().ok().map(|memory| memory.total as f64), "NVML"),
-        (
-            GpuParameterId::ClockGhz,
-            mhz.map(|mhz| f64::from(mhz) / 1000.0),
-            "NVML, clock of the multiprocessors under load",
-        ),
+        (GpuParameterId::ClockGhz, ghz, "NVML, clock of the multiprocessors under load"),
         (GpuParameterId::Processors, processors.map(f64::from), "NVML, CUDA cores over the cores of a multiprocessor"),
         (GpuParameterId::Lanes, cores.map(f64::from), "NVML, CUDA cores"),
     ];
