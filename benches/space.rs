@@ -3,7 +3,7 @@
 //! Reports the median and the slowest hundredth of all updates after a warm-up, setting of the boxes included. Both
 //! sides of a row take turns in each frame.
 
-use sapwise::{Aabb, Adaptive, Body, BroadPhase, Changes, Filter, Membership, Pairs, Registry, Space, Tuning};
+use sapwise::{Aabb, Adaptive, Body, BroadPhase, Changes, Filter, Handle, Membership, Pairs, Registry, Space, Tuning};
 use sapwise_scenes::{Random, Scenario};
 use std::time::Instant;
 
@@ -40,6 +40,11 @@ fn row(name: &str, mut space: Times, mut other: Times) {
     println!("| {name} | {} | {median:.1} | {slow:.1} | {beside:.1} | {:.2} |", space.0.len(), median / beside);
 }
 
+fn step(space: &mut Space, handles: &[Handle], boxes: &[Aabb]) {
+    space.set_all(handles, boxes).expect("valid boxes");
+    space.update().expect("an update");
+}
+
 /// Returns the number of frames for a scene of this size, so that all scenes take about the same time.
 fn frames(objects: usize) -> usize {
     WARM_UP + (2_000_000 / objects).clamp(60, 2000)
@@ -60,10 +65,7 @@ fn all_moving(scenario: Scenario, objects: usize) {
         scene.advance();
         for turn in 0..2 {
             if (turn + frame) % 2 == 0 {
-                one.add(frame, || {
-                    space.set_all(&handles, scene.boxes()).expect("valid boxes");
-                    space.update().expect("an update");
-                });
+                one.add(frame, || step(&mut space, &handles, scene.boxes()));
             } else {
                 other.add(frame, || {
                     boxes.copy_from_slice(scene.boxes());
@@ -94,14 +96,8 @@ fn few_of_many(objects: usize, set: usize) {
         // To and fro, so that no box jumps.
         let at = frame % 510;
         let boxes = &stored[if at < 256 { at } else { 510 - at }];
-        one.add(frame, || {
-            many.set_all(&handles[..set], boxes).expect("valid boxes");
-            many.update().expect("an update");
-        });
-        other.add(frame, || {
-            few.set_all(&alone, boxes).expect("valid boxes");
-            few.update().expect("an update");
-        });
+        one.add(frame, || step(&mut many, &handles[..set], boxes));
+        other.add(frame, || step(&mut few, &alone, boxes));
     }
     row(&format!("{set} of {objects} set: those alone"), one, other);
 }
@@ -121,13 +117,9 @@ fn churn(objects: usize) {
                 space.remove(handles[at]).expect("a body");
                 handles[at] = space.insert(scene.boxes()[at], Body::default()).expect("a valid box");
             }
-            space.set_all(&handles, scene.boxes()).expect("valid boxes");
-            space.update().expect("an update");
+            step(&mut space, &handles, scene.boxes());
         });
-        other.add(frame, || {
-            steady.set_all(&alone, scene.boxes()).expect("valid boxes");
-            steady.update().expect("an update");
-        });
+        other.add(frame, || step(&mut steady, &alone, scene.boxes()));
     }
     row(&format!("{objects} moving, 1 % replaced: none replaced"), one, other);
 }

@@ -141,13 +141,12 @@ impl Fragmentation {
         let parent = self.cubes[at];
         let half = parent.half * self.edges[pieces];
         for k in 0..pieces {
-            let jitter = rng.signed3();
             let mut piece = Cube { half, ..parent };
-            for a in 0..3 {
+            for (a, jitter) in rng.signed3().into_iter().enumerate() {
                 let side = if k >> a & 1 == 1 { 1.0 } else { -1.0 };
-                let away = parent.centre[a] + side * parent.half * 0.5 * (1.0 + GAP) + jitter[a] * half * JITTER;
+                let away = parent.centre[a] + side * parent.half * 0.5 * (1.0 + GAP) + jitter * half * JITTER;
                 piece.centre[a] = reflect(away, self.wall);
-                piece.velocity[a] = INHERITED * parent.velocity[a] + side * half * SPEED * (1.5 + 0.5 * jitter[a]);
+                piece.velocity[a] = INHERITED * parent.velocity[a] + side * half * SPEED * (1.5 + 0.5 * jitter);
             }
             if k == 0 { self.cubes[at] = piece } else { self.cubes.push(piece) }
         }
