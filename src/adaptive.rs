@@ -243,4 +243,4 @@ impl fmt::Debug for Adaptive {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

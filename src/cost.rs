@@ -79,7 +79,6 @@ pub struct CostTerm {
 /// One load under which many costs are computed: what they have in common is computed once.
 pub(crate) struct Frame<'a> {
     counts: Counts<'a>,
-    load: &'a Load,
     /// Of the first places that were asked for; the methods of a tuning share theirs.
     likeness: OnceCell<(Arc<Places>, Likeness)>,
     /// Costs of works, which the algorithms of a method share.
@@ -88,15 +87,15 @@ pub(crate) struct Frame<'a> {
 
 impl<'a> Frame<'a> {
     pub(crate) fn new(load: &'a Load) -> Self {
-        Self { counts: Counts::new(load), load, likeness: OnceCell::new(), known: [const { Cell::new(None) }; 8] }
+        Self { counts: Counts::new(load), likeness: OnceCell::new(), known: [const { Cell::new(None) }; 8] }
     }
 
     /// The factor of a residual on a cost.
     fn factor(&self, residual: Option<&Residual>) -> f64 {
         let Some(residual) = residual else { return 1.0 };
         let places = &residual.places;
-        let (of, likeness) = self.likeness.get_or_init(|| (Arc::clone(places), places.likeness_of(self.load)));
-        let ln = if Arc::ptr_eq(of, places) { residual.ln_of(likeness) } else { residual.ln(self.load) };
+        let (of, likeness) = self.likeness.get_or_init(|| (Arc::clone(places), places.likeness_of(self.counts.load)));
+        let ln = if Arc::ptr_eq(of, places) { residual.ln_of(likeness) } else { residual.ln(self.counts.load) };
         ln.exp()
     }
 
@@ -199,7 +198,7 @@ impl CostCurve {
 
     pub(crate) fn cost_of<'a>(&'a self, frame: &Frame<'a>) -> f64 {
         let work_ns = frame.work(&self.work);
-        let ns = self.helpers.map_or(work_ns, |h| h.cost_ns(frame.load.objects, work_ns));
+        let ns = self.helpers.map_or(work_ns, |h| h.cost_ns(frame.counts.load.objects, work_ns));
         ns * frame.factor(self.residual.as_ref())
     }
 

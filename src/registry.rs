@@ -77,7 +77,7 @@ impl Registry {
         };
         for method in cpu::METHODS {
             for threads in thread_counts(cores) {
-                let unavailable = registry.unavailable(threads);
+                let unavailable = registry.threads.unavailable(threads, registry.cores);
                 let entry = Entry::new(AlgorithmId::cpu(method.name, threads), method.revision);
                 registry.set(Entry { unavailable, ..entry }, Maker::BuiltIn);
             }
@@ -206,12 +206,8 @@ impl Registry {
 
     /// Returns the threads that algorithms created from now on may use, as many as they can have.
     pub(crate) fn most_workers(&self, method: &'static str) -> Workers {
-        let most = (1..=self.cores).rev().find(|&k| self.unavailable(k).is_none());
+        let most = (1..=self.cores).rev().find(|&k| self.threads.unavailable(k, self.cores).is_none());
         Workers::new(method, most.unwrap_or(1), &self.threads)
-    }
-
-    fn unavailable(&self, threads: u32) -> Option<Unavailable> {
-        self.threads.unavailable(threads, self.cores)
     }
 
     /// Returns every algorithm, the built-in ones first.
@@ -265,7 +261,7 @@ impl Registry {
             return make();
         }
         if let Some(method) = built_in(id) {
-            return match self.unavailable(id.threads()) {
+            return match self.threads.unavailable(id.threads(), self.cores) {
                 Some(reason) => Err(Error::Unavailable { algorithm: id.clone(), reason }),
                 None => (method.create)(id.threads(), &self.threads, Simd::at_most(self.simd)),
             };

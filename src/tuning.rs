@@ -214,16 +214,13 @@ impl Tuning {
 
     /// The algorithms that this tuning may choose: those of `costs` in their order, else those of `steps`.
     pub fn algorithms(&self) -> Vec<&AlgorithmId> {
-        if self.costs.is_empty() {
-            let mut list: Vec<&AlgorithmId> = Vec::new();
-            for step in &self.steps {
-                if !list.contains(&&step.algorithm) {
-                    list.push(&step.algorithm);
-                }
+        let mut list: Vec<&AlgorithmId> = self.costs.iter().map(|c| &c.algorithm).collect();
+        for step in self.steps.iter().filter(|_| self.costs.is_empty()) {
+            if !list.contains(&&step.algorithm) {
+                list.push(&step.algorithm);
             }
-            return list;
         }
-        self.costs.iter().map(|c| &c.algorithm).collect()
+        list
     }
 
     /// The tuning with `brute` on one thread and `pair-cache` as the only built-in methods on the CPU. `pair-cache`

@@ -36,7 +36,7 @@ impl Instance {
 
     /// Gets it ready for frames of that many objects, now.
     pub(super) fn prepare(&mut self, objects: usize) {
-        self.place.wait();
+        self.place.take_back(true);
         if let Some(algorithm) = self.place.here() {
             algorithm.prepare(objects);
             self.ready = self.ready.max(objects);
@@ -57,17 +57,6 @@ impl Instance {
         }
     }
 
-    /// Takes it back from that thread if it is ready, or else with `patience` when it is. Whether it has come back.
-    pub(super) fn take_back(&mut self, patience: bool) -> bool {
-        let away = self.place.is_away();
-        if patience {
-            self.place.wait();
-        } else {
-            self.place.take_back();
-        }
-        away && !self.place.is_away()
-    }
-
     /// Finds the pairs of this frame. Returns how the frame came about where one may build on the one before.
     pub(super) fn run(
         &mut self,
@@ -76,9 +65,7 @@ impl Instance {
         boxes: &[Aabb],
         pairs: &mut Pairs,
     ) -> Result<Option<FrameWork>, Error> {
-        let Some(algorithm) = self.place.here() else {
-            return Err(Error::Unavailable { algorithm: self.id.clone(), reason: Unavailable::FailedBefore });
-        };
+        let Some(algorithm) = self.place.here() else { return Err(self.gone()) };
         if let Some(left_at) = self.left_at.filter(|&left_at| self.is_incremental && left_at < frame) {
             algorithm.missed_frames(frame - left_at);
             // Should this frame fail, those up to it are told.
@@ -90,13 +77,17 @@ impl Instance {
         Ok(self.work())
     }
 
-    /// Finds the pairs of a frame of which nothing was worked out, for the same candidate as in the last frame.
-    /// `None` where that can't run.
-    pub(super) fn go_on(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Option<Result<Option<FrameWork>, Error>> {
-        let algorithm = self.place.here()?;
+    /// Does the same without a plan, if this instance also ran the previous frame.
+    pub(super) fn go_on(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<Option<FrameWork>, Error> {
+        let Some(algorithm) = self.place.here() else { return Err(self.gone()) };
         let found = algorithm.find_pairs(boxes, pairs).map(|()| self.work());
         self.ready = self.ready.max(boxes.len());
-        Some(found)
+        found
+    }
+
+    #[cold]
+    fn gone(&self) -> Error {
+        Error::Unavailable { algorithm: self.id.clone(), reason: Unavailable::FailedBefore }
     }
 
     /// How the last frame came about, where one may build on the one before. Checked once more: the fields are

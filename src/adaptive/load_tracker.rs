@@ -21,7 +21,7 @@ const SAMPLE_EVERY: u32 = 32;
 const DRIFTED: f64 = 1.0 / 16.0;
 
 /// Motion shows in two consecutive frames.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 enum Watch {
     #[default]
     Resting,
@@ -77,7 +77,7 @@ impl LoadTracker {
             counted::spend(counted::sample_ns(boxes.len()));
             spent_ns = elapsed_ns(started);
             self.sample_ns = capped(spent_ns, self.sample_ns);
-            self.want_motion();
+            self.watch = self.watch.max(Watch::Due);
             (self.sampled, self.age, self.since_sample_ns) = (Some(objects), 0, 0.0);
         } else {
             self.load = self.load.rescaled(objects, pairs.unwrap_or(self.load.pairs));
@@ -112,12 +112,6 @@ impl LoadTracker {
         !same
     }
 
-    fn want_motion(&mut self) {
-        if self.watch == Watch::Resting {
-            self.watch = Watch::Due;
-        }
-    }
-
     /// Takes in a frame that needed no decision.
     pub(super) fn went_on(&mut self, boxes: &[Aabb], pairs: u64, epoch: &Epoch) {
         self.pace.ran(count(boxes), pairs);
@@ -125,7 +119,7 @@ impl LoadTracker {
             self.pace.wake();
         }
         if epoch.is_off(self.pace.rest_ns()) {
-            self.want_motion();
+            self.watch = self.watch.max(Watch::Due);
             self.pace.wake();
         }
     }

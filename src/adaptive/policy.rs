@@ -405,7 +405,7 @@ impl Policy {
         };
         let best = (0..self.candidates.len()).filter_map(offer).max_by(|a, b| a.1.total_cmp(&b.1));
         if let Some((trial, _)) = best {
-            self.trials.begin(trial, self.frame);
+            (self.trials.running, self.trials.begun_at) = (Some(trial), self.frame);
         }
     }
 

@@ -149,8 +149,8 @@ impl Runner {
     /// Runs a frame.
     pub(super) fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
         let objects = count(boxes);
-        if self.steady && !self.tracker.pace.is_due(objects) {
-            return self.go_on(boxes, pairs);
+        if let Some(running) = self.running.filter(|_| self.steady && !self.tracker.pace.is_due(objects)) {
+            return self.go_on(running, boxes, pairs);
         }
         // A decision for another number of boxes is made again.
         if self.decided.take() != Some(boxes.len()) {
@@ -224,16 +224,14 @@ impl Runner {
     /// Takes back what has got ready, or with `patience` all that is getting ready. Returns whether anything came.
     fn take_back(&mut self, patience: bool) -> bool {
         let mut any = false;
-        if !self.any_away {
-            return any;
-        }
-        self.any_away = false;
-        for k in 0..self.instances.len() {
-            if self.instances[k].take_back(patience) {
-                self.update(k);
-                any = true;
+        if self.any_away {
+            for k in 0..self.instances.len() {
+                if self.instances[k].place.take_back(patience) {
+                    self.update(k);
+                    any = true;
+                }
             }
-            self.any_away |= self.instances[k].place.is_away();
+            self.any_away = self.instances.iter().any(|instance| instance.place.is_away());
         }
         any
     }
@@ -244,10 +242,9 @@ impl Runner {
     }
 
     /// Runs a frame that needs no decision.
-    fn go_on(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+    fn go_on(&mut self, running: usize, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
         let started = self.epoch.is_timed().then(Instant::now);
-        let instance = self.running.map(|running| &mut self.instances[running]);
-        match instance.and_then(|i| i.go_on(boxes, pairs)).unwrap_or_else(|| Err(self.gone())) {
+        match self.instances[running].go_on(boxes, pairs) {
             Ok(work) => {
                 let ns = started.and_then(clock::measured_ns);
                 (self.work, self.measured_ns) = (work, ns);
@@ -334,13 +331,6 @@ impl Runner {
                 tracing::debug!(target: "sapwise::adaptive", "{decision}");
             }
         }
-    }
-
-    /// What to say if the algorithm that runs is gone.
-    #[cold]
-    fn gone(&self) -> Error {
-        let algorithm = self.instances[self.choice.map_or(0, |choice| choice.chosen)].id.clone();
-        Error::Unavailable { algorithm, reason: Unavailable::FailedBefore }
     }
 
     /// Takes in that the frame failed. If the algorithm is at fault, and not the boxes, chooses another one.

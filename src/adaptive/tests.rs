@@ -29,11 +29,20 @@ fn tuning_of(terms: [Term; 2], costs: &[(&str, f64, f64)]) -> Tuning {
     Tuning::from_costs(Source::Measured, "uniform", costs.collect(), &loads)
 }
 
-/// Over algorithms whose costs are made up: what their frames really take is to change nothing.
+/// Returns a choice by made-up costs, which the times of frames do not correct.
 fn fixed(tuning: Tuning) -> Adaptive {
-    let mut adaptive = Adaptive::new(tuning, &Registry::with_cores(1)).unwrap();
+    fixed_of(tuning, &Registry::with_cores(1))
+}
+
+fn fixed_of(tuning: Tuning, registry: &Registry) -> Adaptive {
+    let mut adaptive = Adaptive::new(tuning, registry).unwrap();
     adaptive.set_learning(false);
     adaptive
+}
+
+/// Returns a tuning of hand-written steps.
+pub(crate) fn tuning_of_steps(steps: &[(u32, &str)]) -> Tuning {
+    Tuning::from_steps(steps.iter().map(|&(from, id)| Step::new(from, id.parse().unwrap())).collect()).unwrap()
 }
 
 /// The revision that this build has of a method of the CPU; 1 of any other.
@@ -72,9 +81,7 @@ fn it_switches_at_the_border_and_not_within_the_hysteresis() {
 
 #[test]
 fn hand_written_thresholds_decide_by_count() {
-    let step = |from_objects, id: &str| Step { from_objects, algorithm: id.parse().unwrap() };
-    let steps = vec![step(0, "brute@cpu1"), step(64, "sap@cpu1"), step(1000, "grid-sap@cpu1")];
-    let tuning = Tuning::from_steps(steps).unwrap();
+    let tuning = tuning_of_steps(&[(0, "brute@cpu1"), (64, "sap@cpu1"), (1000, "grid-sap@cpu1")]);
     let mut adaptive = Adaptive::new(tuning, &Registry::with_cores(1)).unwrap();
     assert_eq!(chosen(&mut adaptive, 10).0, "brute@cpu1");
     assert_eq!(chosen(&mut adaptive, 65), ("brute@cpu1".to_owned(), Reason::Hysteresis));
@@ -86,19 +93,16 @@ fn hand_written_thresholds_decide_by_count() {
 
 #[test]
 fn steps_whose_algorithm_has_no_cost_are_passed_over() {
-    let step = |from_objects, id: &str| Step { from_objects, algorithm: id.parse().unwrap() };
-    let with_steps = |steps: [(u32, &str); 3]| {
-        let mut tuning = tuning(&[("brute@cpu1", 0.0, 10.0), ("pair-cache@cpu1", 1000.0, 5.0)]);
-        tuning.steps = steps.map(|(from, id)| step(from, id)).to_vec();
-        tuning
-    };
-    let tuning = with_steps([(0, "brute@cpu1"), (60, "octree@cpu1"), (200, "pair-cache@cpu1")]);
-    for (objects, expected) in [(10, "brute@cpu1"), (100, "brute@cpu1"), (500, "pair-cache@cpu1")] {
-        assert_eq!(chosen(&mut fixed(tuning.clone()), objects).0, expected, "{objects} objects");
-    }
-    let tuning = with_steps([(0, "octree@cpu1"), (60, "pair-cache@cpu1"), (200, "brute@cpu1")]);
-    for (objects, expected) in [(10, "pair-cache@cpu1"), (100, "pair-cache@cpu1"), (500, "brute@cpu1")] {
-        assert_eq!(chosen(&mut fixed(tuning.clone()), objects).0, expected, "{objects} objects");
+    let [brute, octree, pair_cache] = ["brute@cpu1", "octree@cpu1", "pair-cache@cpu1"];
+    let costs = tuning(&[(brute, 0.0, 10.0), (pair_cache, 1000.0, 5.0)]);
+    for (steps, few, many) in
+        [([brute, octree, pair_cache], brute, pair_cache), ([octree, pair_cache, brute], pair_cache, brute)]
+    {
+        let steps = tuning_of_steps(&[(0, steps[0]), (60, steps[1]), (200, steps[2])]).steps;
+        let tuning = Tuning { steps, ..costs.clone() };
+        for (objects, expected) in [(10, few), (100, few), (500, many)] {
+            assert_eq!(chosen(&mut fixed(tuning.clone()), objects).0, expected, "{objects} objects");
+        }
     }
 }
 
@@ -191,9 +195,7 @@ fn one_that_keeps_work_is_told_how_many_frames_it_missed() {
     let mut registry = Registry::with_cores(1);
     let shared = Arc::clone(&told);
     registry.add("told@cpu1".parse().unwrap(), 1, move || Ok(Box::new(Told(Arc::clone(&shared)))));
-    let mut adaptive =
-        Adaptive::new(tuning(&[("told@cpu1", 1000.0, 0.0), ("brute@cpu1", 0.0, 10.0)]), &registry).unwrap();
-    adaptive.set_learning(false);
+    let mut adaptive = fixed_of(tuning(&[("told@cpu1", 1000.0, 0.0), ("brute@cpu1", 0.0, 10.0)]), &registry);
     // In the first 50 frames it has not run yet, and has missed none.
     for objects in [10, 1000, 10, 1000, 1000, 10, 1000] {
         (0..50).for_each(|_| _ = chosen(&mut adaptive, objects));

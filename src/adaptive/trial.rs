@@ -36,7 +36,7 @@ impl Trial {
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Trials {
     pub(super) running: Option<Trial>,
-    begun_at: u64,
+    pub(super) begun_at: u64,
     /// Nanoseconds of trials that the budget has not yet covered.
     debt_ns: f64,
 }
@@ -70,10 +70,6 @@ impl Trials {
         (gain_ns > price_ns + LEAST_GAIN * now_ns && affordable).then_some((trial, gain_ns - price_ns))
     }
 
-    pub(super) fn begin(&mut self, trial: Trial, frame: u64) {
-        (self.running, self.begun_at) = (Some(trial), frame);
-    }
-
     /// Takes in a frame of the trial that cost this much more than the incumbent's would have.
     pub(super) fn ran(&mut self, extra_ns: f64) {
         if let Some(trial) = &mut self.running {
@@ -86,7 +82,7 @@ impl Trials {
 
 /// Expected saving, as a share of the incumbent's cost, of learning another's: the mean of what lies below zero of a
 /// normal distribution with this mean and deviation, less what a switch without the trial would save.
-pub(super) fn expected_gain(ratio_ln: f64, told_ln: f64) -> f64 {
+fn expected_gain(ratio_ln: f64, told_ln: f64) -> f64 {
     if told_ln.is_nan() || told_ln <= 0.0 {
         return 0.0;
     }

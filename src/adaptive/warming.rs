@@ -40,35 +40,26 @@ impl Place {
             algorithm.prepare(objects);
             Some(algorithm)
         };
-        match std::mem::replace(self, Self::Gone) {
-            Self::Here(algorithm) => {
-                let Ok(thread) = std::thread::Builder::new().name("sapwise-warm".to_owned()).spawn(run) else {
-                    *self = Self::Here(algorithm);
-                    return;
-                };
+        *self = match std::mem::replace(self, Self::Gone) {
+            Self::Here(algorithm) => match std::thread::Builder::new().name("sapwise-warm".to_owned()).spawn(run) {
                 // Handed over only now: a closure that can't be started is dropped with all that it holds.
-                *self = match hand_over.send(algorithm) {
+                Ok(thread) => match hand_over.send(algorithm) {
                     Ok(()) => Self::Away(Preparing(Some(thread))),
                     Err(mpsc::SendError(algorithm)) => Self::Here(algorithm),
-                };
-            }
-            other => *self = other,
-        }
+                },
+                Err(_) => Self::Here(algorithm),
+            },
+            other => other,
+        };
     }
 
-    /// Takes the algorithm back if it is ready.
-    pub(super) fn take_back(&mut self) {
-        if matches!(self, Self::Away(Preparing(thread)) if thread.as_ref().is_none_or(JoinHandle::is_finished)) {
-            self.wait();
-        }
-    }
-
-    /// Takes the algorithm back, however long that takes.
-    pub(super) fn wait(&mut self) {
-        if let Self::Away(Preparing(thread)) = self {
-            let returned = thread.take().and_then(|thread| thread.join().ok().flatten());
-            *self = returned.map_or(Self::Gone, Self::Here);
-        }
+    /// Takes the algorithm back from its thread if it is ready; with `patience` waits until it is. Returns whether it was
+    /// away and is no longer.
+    pub(super) fn take_back(&mut self, patience: bool) -> bool {
+        let Self::Away(Preparing(thread)) = self else { return false };
+        let Some(thread) = thread.take_if(|thread| patience || thread.is_finished()) else { return false };
+        *self = thread.join().ok().flatten().map_or(Self::Gone, Self::Here);
+        true
     }
 
     pub(super) fn is_here(&self) -> bool {

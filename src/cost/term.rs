@@ -106,7 +106,7 @@ impl Term {
 /// What the terms of all algorithms share under one load, computed once for each decision.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Counts<'a> {
-    load: &'a Load,
+    pub(super) load: &'a Load,
     objects: f64,
     log2_objects: f64,
 }

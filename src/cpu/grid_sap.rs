@@ -179,9 +179,7 @@ impl Bins {
             });
         }
         let mut total = 0_u32;
-        for start in starts.iter_mut() {
-            total += std::mem::replace(start, total);
-        }
+        starts.iter_mut().for_each(|start| total += std::mem::replace(start, total));
         ensure(&mut self.entries, total as usize, "boxes in strips")?;
         let entries = &mut self.entries[..total as usize];
         for ((&span, b), id) in self.spans.iter().zip(share).zip(first as u32..) {

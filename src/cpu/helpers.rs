@@ -68,8 +68,11 @@ impl Helpers {
             return Err(Unavailable::ThreadsRefused { threads: self.count, message: "a test".to_owned() });
         }
         if self.team.get().is_none() {
-            // Of two callers at once, one starts in vain.
-            let _ = self.team.set(Team::new(self.count, self.pinned)?);
+            let cpus = self.count as usize + 1;
+            let placement = if self.pinned { CpuPlacement::choose(cpus).map(Arc::new) } else { None };
+            let pool = Arc::new(build_pool(self.count, placement.clone(), 1)?);
+            // If two callers start helpers at once, those of one are dropped.
+            let _ = self.team.set(Team::over(pool, placement, false));
         }
         Ok(())
     }
@@ -110,12 +113,6 @@ impl Helpers {
 }
 
 impl Team {
-    /// Starts own helpers.
-    fn new(count: u32, pinned: bool) -> Result<Self, Unavailable> {
-        let placement = if pinned { CpuPlacement::choose(count as usize + 1).map(Arc::new) } else { None };
-        Ok(Self::over(Arc::new(build_pool(count, placement.clone(), 1)?), placement, false))
-    }
-
     fn over(pool: Arc<rayon::ThreadPool>, placement: Option<Arc<CpuPlacement>>, may_call: bool) -> Self {
         Self { pool, shared: Arc::new(Shared { phases: Phases::default(), placement }), may_call }
     }

@@ -18,18 +18,8 @@ pub(crate) struct Outputs {
 }
 
 impl Outputs {
-    /// Returns one list for each task of `workers`, empty and under the caller's limit and filter. Lists of more tasks
-    /// stay for later frames.
-    fn ready(&mut self, workers: &Workers, pairs: &Pairs) -> &mut [Pairs] {
-        self.lists.resize_with(self.lists.len().max(workers.tasks()), Pairs::new);
-        let lists = &mut self.lists[..workers.tasks()];
-        self.any_over.store(false, Relaxed);
-        lists.iter_mut().for_each(|list| list.begin_part(pairs, &self.any_over));
-        lists
-    }
-
-    /// Lets `find` fill one list for each task of `workers`, then joins them in order. With one thread the one list is
-    /// the caller's.
+    /// Lets `find` fill one list for each task of `workers`, then joins them in order. The lists begin empty, under the
+    /// caller's limit and filter. With one thread the one list is the caller's.
     pub(crate) fn collect(
         &mut self,
         workers: &Workers,
@@ -39,7 +29,11 @@ impl Outputs {
         if workers.threads() == 1 {
             return find(std::slice::from_mut(pairs));
         }
-        let lists = self.ready(workers, pairs);
+        // Lists of more tasks stay for later frames.
+        self.lists.resize_with(self.lists.len().max(workers.tasks()), Pairs::new);
+        let lists = &mut self.lists[..workers.tasks()];
+        self.any_over.store(false, Relaxed);
+        lists.iter_mut().for_each(|list| list.begin_part(pairs, &self.any_over));
         let found = find(lists);
         if found.is_ok() {
             Self::join(lists, workers, pairs);

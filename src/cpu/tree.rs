@@ -308,7 +308,7 @@ impl Tree {
 
     /// Returns whether too many lanes are empty for this many boxes.
     pub(crate) fn is_sparse(&self, boxes: usize) -> bool {
-        is_sparse(self.places, boxes)
+        self.places as f64 > MOST_PLACES * boxes as f64 + 64.0
     }
 
     /// Adds part `k` of `parts` of the pairs of its boxes with each other, without those of two passive boxes.
@@ -354,10 +354,6 @@ impl Tree {
     }
 }
 
-fn is_sparse(places: usize, boxes: usize) -> bool {
-    places as f64 > MOST_PLACES * boxes as f64 + 64.0
-}
-
 /// Makes room for this many places and for the nodes above them, with unspecified content.
 fn lay_out(levels: &mut Vec<Vec<Node>>, ids: &mut Vec<u32>, places: usize) -> Result<(), Error> {
     let mut nodes = places.div_ceil(LANES);
@@ -396,6 +392,7 @@ mod tests {
 
     #[test]
     fn third_of_the_places_may_be_empty() {
-        assert!(!is_sparse(1200, 1000) && is_sparse(1500, 1000));
+        let is_sparse = |places| Tree { places, ..Tree::default() }.is_sparse(1000);
+        assert!(!is_sparse(1200) && is_sparse(1500));
     }
 }

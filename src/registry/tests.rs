@@ -1,4 +1,5 @@
 use super::*;
+use crate::adaptive::tests::tuning_of_steps;
 use crate::{Aabb, Pairs};
 
 #[test]
@@ -49,8 +50,7 @@ fn no_file_starts_more_threads_than_there_are_cores() {
             assert!(error.to_string().contains("but this machine has 3"), "{error}");
         }
         // Nor does a tuning of steps.
-        let step = |from_objects, id: &str| crate::tuning::Step { from_objects, algorithm: id.parse().unwrap() };
-        let tuning = crate::Tuning::from_steps(vec![step(0, text), step(20, "brute@cpu1")]).unwrap();
+        let tuning = tuning_of_steps(&[(0, text), (20, "brute@cpu1")]);
         let mut adaptive = crate::Adaptive::new(tuning, &registry).unwrap();
         adaptive.find_pairs(&[Aabb::cube([0.0; 3], 1.0)], &mut Pairs::new()).unwrap();
         assert_eq!(adaptive.last_decision().unwrap().algorithm.to_string(), "brute@cpu1");
@@ -78,9 +78,8 @@ fn refused_threads_are_an_error_of_the_frame() {
     use std::sync::atomic::Ordering::Relaxed;
     let registry = Registry::with_cores(3);
     let boxes: Vec<Aabb> = (0..5000).map(|k| Aabb::cube([k as f32, 0.0, 0.0], 0.5)).collect();
-    let step = |from_objects, id: &str| crate::tuning::Step { from_objects, algorithm: id.parse().unwrap() };
-    let steps = vec![step(0, "pair-cache@cpu1"), step(2000, "pair-cache@cpu3")];
-    let mut adaptive = crate::Adaptive::new(crate::Tuning::from_steps(steps).unwrap(), &registry).unwrap();
+    let tuning = tuning_of_steps(&[(0, "pair-cache@cpu1"), (2000, "pair-cache@cpu3")]);
+    let mut adaptive = crate::Adaptive::new(tuning, &registry).unwrap();
     let ids = cpu::METHODS.iter().map(|method| AlgorithmId::cpu(method.name, 3));
     let made: Vec<_> = ids.map(|id| (registry.create(&id).unwrap(), id)).collect();
     let mut pairs = Pairs::new();

@@ -3,7 +3,7 @@
 use super::body::Body;
 use super::handle::Handle;
 use crate::cpu::reserve;
-use crate::{Aabb, Error};
+use crate::{Aabb, Error, check_count};
 
 /// Where a body is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,9 +56,7 @@ impl Slots {
     pub(super) fn reserve(&mut self, more: usize) -> Result<(), Error> {
         let room = more.saturating_sub(self.free.len());
         let most = self.boxes.len().saturating_add(room);
-        if u32::try_from(most).is_err() {
-            return Err(Error::TooManyObjects { objects: most });
-        }
+        check_count(most)?;
         reserve(&mut self.slots, room, "bodies")?;
         reserve(&mut self.boxes, room, "bodies")?;
         reserve(&mut self.bodies, room, "bodies")?;

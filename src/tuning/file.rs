@@ -146,6 +146,8 @@ impl TryFrom<TuningFile> for Tuning {
     type Error = TuningError;
 
     fn try_from(file: TuningFile) -> Result<Self, TuningError> {
+        let TuningFile { source, model, extrapolated, warnings, scenario, steps, crossovers, interval_basis, .. } =
+            file;
         let places = Arc::new(Places::new(file.places));
         let mut works: Vec<Arc<Work>> = Vec::new();
         for WorkFile { terms, fallback, cache_bytes, residual, residual_by_motion } in file.works {
@@ -167,17 +169,8 @@ impl TryFrom<TuningFile> for Tuning {
             let curve = CostCurve { work: Arc::clone(known), helpers, residual };
             Ok(AlgorithmCost { algorithm, revision, curve, spread_ln })
         };
-        let tuning = Self {
-            source: file.source,
-            model: file.model,
-            extrapolated: file.extrapolated,
-            warnings: file.warnings,
-            scenario: file.scenario,
-            steps: file.steps,
-            crossovers: file.crossovers,
-            interval_basis: file.interval_basis,
-            costs: file.costs.into_iter().map(cost).collect::<Result<_, _>>()?,
-        };
+        let costs = file.costs.into_iter().map(cost).collect::<Result<_, _>>()?;
+        let tuning = Self { source, model, extrapolated, warnings, scenario, steps, crossovers, interval_basis, costs };
         tuning.defect().map_or(Ok(tuning), Err)
     }
 }

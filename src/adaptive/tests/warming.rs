@@ -47,10 +47,7 @@ fn beside(other: &str, costs: [(f64, f64); 2]) -> (Adaptive, Arc<Gate>) {
     });
     registry.add("fragile@gpu1".parse().unwrap(), 1, || fragile(3));
     let [(call, object), (slow_call, slow_object)] = costs;
-    let tuning = tuning(&[(other, call, object), ("slow@gpu0", slow_call, slow_object)]);
-    let mut adaptive = Adaptive::new(tuning, &registry).unwrap();
-    adaptive.set_learning(false);
-    (adaptive, gate)
+    (fixed_of(tuning(&[(other, call, object), ("slow@gpu0", slow_call, slow_object)]), &registry), gate)
 }
 
 #[test]
@@ -104,9 +101,7 @@ fn what_gets_ready_ends_with_the_module() {
 fn one_that_panics_while_it_gets_ready_is_never_chosen() {
     let mut registry = Registry::with_cores(1);
     registry.add("panics@gpu0".parse().unwrap(), 1, || Ok(Box::new(MadeUp(|| Ok(()), || panic!("of the test")))));
-    let tuning = tuning(&[("brute@cpu1", 0.0, 10.0), ("panics@gpu0", 500.0, 5.0)]);
-    let mut adaptive = Adaptive::new(tuning, &registry).unwrap();
-    adaptive.set_learning(false);
+    let mut adaptive = fixed_of(tuning(&[("brute@cpu1", 0.0, 10.0), ("panics@gpu0", 500.0, 5.0)]), &registry);
     (0..2).for_each(|_| _ = chosen(&mut adaptive, 90));
     // Waits for it, and goes on without it.
     adaptive.prepare(90);

@@ -194,20 +194,24 @@ mod tests {
     use crate::{Aabb, Filter, Membership};
     use std::sync::Arc;
 
+    /// Returns boxes as columns, ascending along x.
+    fn sorted(boxes: &[Aabb]) -> Columns {
+        let mut columns = Columns::default();
+        columns.resize(boxes.len()).unwrap();
+        let mut ids: Vec<usize> = (0..boxes.len()).collect();
+        ids.sort_by(|&a, &b| boxes[a].min[0].total_cmp(&boxes[b].min[0]));
+        ids.iter().enumerate().for_each(|(row, &id)| columns.as_mut().set(row, &boxes[id], 0, id as u32));
+        columns
+    }
+
     /// `overlapping` counts the pairs that the filter drops too: it shows how many were found.
     #[test]
     fn search_over_limit_ends_with_its_row() {
-        let boxes = vec![Aabb::cube([1.0; 3], 0.5); 1000];
-        let mut columns = Columns::default();
-        columns.resize(boxes.len()).unwrap();
-        boxes.iter().enumerate().for_each(|(row, b)| columns.as_mut().set(row, b, 0, row as u32));
+        let columns = sorted(&[Aabb::cube([1.0; 3], 0.5); 1000]);
         let ground = |k: usize| Membership { fixed: k >= 500, ..Membership::ALL };
-        let whole = {
-            let mut pairs = Pairs::new();
-            pairs.set_limit(Some(10));
-            pairs.set_filter(Some(Filter::new((0..1000).map(ground).collect())));
-            pairs
-        };
+        let mut whole = Pairs::new();
+        whole.set_limit(Some(10));
+        whole.set_filter(Some(Filter::new((0..1000).map(ground).collect())));
         let brute_rows =
             |simd, columns: &Columns, rows, pairs: &mut Pairs| brute_rows(simd, columns, rows, |row| row + 1, pairs);
         for search in [&sweep_rows::<false> as &dyn Fn(Simd, &Columns, Range<usize>, &mut Pairs), &brute_rows] {
@@ -239,13 +243,7 @@ mod tests {
         let boxes: Vec<Aabb> = (0..203)
             .map(|k| Aabb::cube([k as f32 / 8.0, (k * 7 % 13) as f32, (k * 5 % 11) as f32], 0.5 + (k % 5) as f32))
             .collect();
-        let mut columns = Columns::default();
-        columns.resize(boxes.len()).unwrap();
-        let mut at: Vec<usize> = (0..boxes.len()).collect();
-        at.sort_by(|&a, &b| boxes[a].min[0].total_cmp(&boxes[b].min[0]));
-        for (row, &id) in at.iter().enumerate() {
-            columns.as_mut().set(row, &boxes[id], 0, id as u32);
-        }
+        let columns = sorted(&boxes);
         let expected = double_loop(&boxes);
         let (mut swept, mut tested) = (Pairs::new(), Pairs::new());
         let view = View::new(&columns);
