@@ -289,12 +289,12 @@ impl Policy {
         let frame = Frame::new(load);
         for (c, cost) in self.candidates.iter_mut().zip(&self.tuning.costs) {
             c.predicted_ns = cost.curve.cost_of(&frame);
+            c.own.fade(keep);
         }
         for k in 0..self.candidates.len() {
             let Candidate { usable: true, predicted_ns: ns, leader, .. } = self.candidates[k] else { continue };
             self.candidates[leader].predicted_ns = self.candidates[leader].predicted_ns.min(ns);
         }
-        self.candidates.iter_mut().for_each(|c| c.own.fade(keep));
         (0..self.candidates.len()).for_each(|k| self.correct(k));
     }
 

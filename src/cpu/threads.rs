@@ -19,13 +19,16 @@ pub struct Threads {
     /// Whether algorithms made from now on decide by counted work, and not by the clock: then they do the same work in
     /// every run.
     pub untimed: bool,
-    /// By the number of helpers, and whether they are pinned.
     #[cfg(feature = "parallel")]
-    pools: Arc<Mutex<BTreeMap<(u32, bool), Arc<Helpers>>>>,
+    pools: Arc<Mutex<BTreeMap<Kind, Arc<Helpers>>>>,
     /// The program's pool; see [`Registry::use_pool`](crate::Registry::use_pool).
     #[cfg(feature = "parallel")]
     given: Option<Arc<Helpers>>,
 }
+
+/// The number of helpers of a pool, and whether they are pinned.
+#[cfg(feature = "parallel")]
+type Kind = (u32, bool);
 
 impl Threads {
     /// Makes pools whose threads are pinned.
