@@ -1,4 +1,4 @@
-//! The in-line module: the cheapest algorithm for this frame, chosen before it runs.
+//! The in-line module: before each frame it chooses the algorithm that it expects to be cheapest.
 
 mod decision;
 mod epoch;
@@ -30,13 +30,13 @@ pub use instances::Instances;
 pub use setup::{Arrival, Background, Start};
 pub use setup::{Origin, SaveError, Setup};
 
-/// Sizes of the slice that learned tuning shows: four a decade from ten to a million, in quarters of a decade.
+/// Sizes of the slice in a learned tuning, in quarters of a decade: from ten to a million objects.
 const SLICE: std::ops::RangeInclusive<u32> = 4..=24;
 
 /// A broad phase that runs whichever algorithm is expected to be cheapest for each frame.
 ///
-/// Every algorithm takes the same boxes and returns the same pairs, so a switch is invisible but for its speed. What
-/// is expected comes from [`Tuning`] and, where these have cost curves, from the times of the frames that were run:
+/// Every algorithm takes the same boxes and returns the same pairs, so a switch changes the speed alone. The expected
+/// costs come from a [`Tuning`]. If it has cost curves, the times of frames correct them; see
 /// [`set_learning`](Self::set_learning).
 ///
 /// ```
@@ -51,16 +51,15 @@ const SLICE: std::ops::RangeInclusive<u32> = 4..=24;
 /// ```
 pub struct Adaptive {
     runner: Runner,
-    /// How it came to its tuning.
+    /// The origin of the tuning, and its cache.
     start: Start,
 }
 
 impl Adaptive {
-    /// An adaptive broad phase over those algorithms of `tuning` that `registry` can make.
+    /// Makes a choice among those algorithms of `tuning` that `registry` can make.
     ///
-    /// An algorithm whose cost was found for another revision is left out, and so is one with more threads than the
-    /// registry lists: its cost says nothing about this build or this machine. So are those that
-    /// [`Tuning::for_running`] leaves out.
+    /// Leaves out algorithms whose cost is for another revision or for more threads than the registry lists: such a
+    /// cost does not apply to this build or machine. Also leaves out those that [`Tuning::for_running`] replaces.
     ///
     /// # Errors
     /// [`Error::Unavailable`] or [`Error::UnknownAlgorithm`] when none can be made, [`Error::NoAlgorithm`] when none
@@ -71,14 +70,14 @@ impl Adaptive {
         made.failure().map_or_else(|| Ok(Self::with(tuning, made)), Err)
     }
 
-    /// Over instances that are there already.
+    /// Makes a choice among existing instances.
     #[doc(hidden)]
     #[must_use]
     pub fn with(tuning: Tuning, made: Instances) -> Self {
         Self { runner: Runner::new(tuning, made), start: Start::default() }
     }
 
-    /// Runs one algorithm always.
+    /// Makes a choice of one algorithm, which runs every frame.
     ///
     /// # Errors
     /// As [`Registry::create`].
@@ -88,34 +87,35 @@ impl Adaptive {
         Self::new(tuning, registry)
     }
 
-    /// Whether the times of frames correct the expected costs. On unless it is turned off; what was learned until
-    /// then stays in use.
+    /// Sets whether the times of frames correct the expected costs. The default is on. Turned off, corrections learned
+    /// earlier stay in use.
     ///
-    /// Tuning without cost curves have nothing to correct, and decide by the number of objects always. On
-    /// `wasm32-unknown-unknown`, which has no clock, no frame is timed and nothing is learned, unless the program gives
-    /// a clock by `sapwise::set_clock`. Frames of less than four ticks of that clock are not learned from.
+    /// A tuning without cost curves has nothing to correct: it always decides by the number of objects.
+    /// `wasm32-unknown-unknown` has no clock, so nothing is learned there unless the program gives one with
+    /// `sapwise::set_clock`. Frames shorter than four ticks of that clock do not count.
     pub fn set_learning(&mut self, learns: bool) {
         self.runner.policy.learns = learns && clock::ticks();
     }
 
-    /// Whether trials run: now and then another algorithm than the cheapest runs for 2 to 16 frames, to learn what it
-    /// costs. A trial begins if it is expected to save five frames more in the next 300 than it costs. Trials may
-    /// cost 0.5 % of the time, eight frames in advance, and on credit a seventeenth of what they are expected to save.
-    /// On unless turned off; without [learning](Self::set_learning) none runs. On how many threads `pair-cache` is fast
-    /// it tries by itself, for another 0.5 %.
+    /// Sets whether trials run. The default is on; without [learning](Self::set_learning) none runs.
+    ///
+    /// A trial runs another algorithm than the cheapest for 2 to 16 frames, to measure its cost. It begins
+    /// if the expected saving over the next 300 frames exceeds its price by five frames. The exploration budget is
+    /// 0.5 % of the time, up to eight frames in advance, and on credit a seventeenth of the expected saving.
+    /// `pair-cache` tries numbers of threads by itself, for another 0.5 %.
     pub fn set_exploring(&mut self, explores: bool) {
         self.runner.policy.explores = explores;
     }
 
-    /// The tuning that it began with.
+    /// Returns the tuning without corrections.
     #[must_use]
     pub fn tuning(&self) -> &Tuning {
         &self.runner.policy.tuning
     }
 
-    /// The tuning corrected by what was learned of the machine and of each algorithm, with the slice of scenes like
-    /// the present one. What passes is left out: another program on a core, cores that moved apart, how much this
-    /// scene spares incremental algorithms. Those that it began with where nothing was learned.
+    /// Returns the tuning with the corrections learned for the machine and for each algorithm, along a slice of scenes
+    /// like the present one. Passing effects are left out: another program on a core, cores that moved apart, the
+    /// savings of incremental algorithms in this scene. If nothing was learned, returns the original tuning.
     #[must_use]
     pub fn learned(&self) -> Tuning {
         let tuning = &self.runner.policy.tuning;
@@ -138,13 +138,13 @@ impl Adaptive {
         }
     }
 
-    /// Makes every algorithm again from this registry: one that was lost and is back, or all of them on a pool of
-    /// another size. What was learned stays, unless incremental algorithms came or went; what they kept from frame to
-    /// frame is gone. A tuning that is still awaited from the background brings algorithms of the registry that they
-    /// were asked with.
+    /// Makes every algorithm anew from this registry: for a lost GPU that is back, or a pool of another size.
+    ///
+    /// Learned corrections stay, unless incremental algorithms came or went. State that algorithms kept from frame to
+    /// frame is lost. A tuning that still arrives from the background uses the registry it was requested with.
     ///
     /// # Errors
-    /// As [`new`](Self::new); the algorithms of before stay then.
+    /// As [`new`](Self::new). Then the previous algorithms stay.
     pub fn revive(&mut self, registry: &Registry) -> Result<(), Error> {
         let mut made = Instances::of(&self.runner.policy.tuning, registry);
         if let Some(error) = made.failure() {
@@ -154,7 +154,7 @@ impl Adaptive {
         Ok(())
     }
 
-    /// Takes the tuning from the background thread once it is there.
+    /// Takes the tuning from the background thread if it is ready.
     pub(crate) fn take_over(&mut self) {
         let arrived = self.start.arrived();
         self.runner.awaits = self.start.background.is_some();
@@ -163,30 +163,32 @@ impl Adaptive {
         }
     }
 
-    /// Where its tuning came from, what went wrong on the way and how long it took.
+    /// Returns the origin of the tuning, the remarks on what went wrong, and the seconds that it took.
     #[must_use]
     pub fn setup(&self) -> &Setup {
         &self.start.setup
     }
 
-    /// Writes what was learned to the cache, for the next start on this machine: call it at the end of a session.
+    /// Writes the [learned](Self::learned) tuning to the cache, for the next start on this machine. Call it at the end
+    /// of a session.
+    ///
     /// Returns `false` and writes nothing if the tuning of this machine has not arrived yet, could not be predicted,
     /// or follows from a measurement with an implausible value, which the [remarks](Setup::remarks) name.
     ///
     /// # Errors
-    /// When there is no cache or its file can't be written.
+    /// There is no cache, or its file can't be written.
     pub fn save(&self) -> Result<bool, SaveError> {
         self.start.save(|| self.learned())
     }
 
-    /// Begins with what a start on this machine found.
+    /// Sets the result of a start on this machine.
     #[doc(hidden)]
     pub fn set_start(&mut self, start: Start) {
         self.runner.awaits = start.background.is_some();
         self.start = start;
     }
 
-    /// What was decided for the last frame; `None` before the first. As a text it is a sentence that tells why.
+    /// Returns the decision for the last frame, `None` before the first. Its text is a sentence with the reason.
     ///
     /// With the feature `tracing` every switch is an event with that text: target `sapwise::adaptive`, level DEBUG;
     /// trials have level TRACE.
@@ -195,7 +197,7 @@ impl Adaptive {
         self.runner.last_decision()
     }
 
-    /// Estimates the load of the next frame and decides, without running anything.
+    /// Estimates the load of the next frame and decides, without running an algorithm.
     pub fn decide(&mut self, boxes: &[Aabb]) -> Option<Decision<'_>> {
         self.take_over();
         self.runner.decide(boxes);
@@ -203,10 +205,10 @@ impl Adaptive {
     }
 }
 
-/// A clone has the same tuning, settings and cache file, and knows what the original has learned. It makes its
-/// algorithms anew from the same registry, so it runs on the same helper threads and GPUs. While the original
-/// [awaits](Origin::Awaited) its tuning, a clone gets the usual one for good. If no algorithm can be made, its frames
-/// are errors.
+/// A clone has the same tuning, settings, cache file and learned corrections. It makes its algorithms anew from the
+/// same registry, so it runs on the same helper threads and GPUs. A clone of an original that still
+/// [awaits](Origin::Awaited) its tuning keeps the usual one for good. If no algorithm can be made, its frames are
+/// errors.
 impl Clone for Adaptive {
     fn clone(&self) -> Self {
         Self { runner: self.runner.twin(), start: self.start.twin() }
@@ -225,12 +227,12 @@ impl BroadPhase for Adaptive {
         self.runner.prepare(objects);
     }
 
-    /// Whether any of its algorithms is incremental.
+    /// Returns whether any of its algorithms is incremental.
     fn is_incremental(&self) -> bool {
         self.runner.is_incremental()
     }
 
-    /// Of an algorithm that keeps nothing every frame is from scratch.
+    /// Returns the work of the last frame: from scratch, if the algorithm that ran is not incremental.
     fn last_frame(&self) -> FrameWork {
         self.runner.work.unwrap_or(FrameWork::new(FrameKind::FromScratch, 1.0))
     }

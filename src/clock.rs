@@ -39,7 +39,7 @@ pub(crate) fn elapsed_ns(since: Instant) -> f64 {
     since.elapsed().as_nanos() as u64 as f64
 }
 
-/// Returns the nanoseconds since then, at least 1; `None` if the clock is too coarse to tell.
+/// Returns the nanoseconds since then, at least 1; `None` if the clock is too coarse for that time.
 pub(crate) fn measured_ns(since: Instant) -> Option<f64> {
     let (ns, tick) = (elapsed_ns(since), tick()?);
     (ns >= (FEWEST_TICKS * tick).as_nanos() as f64).then_some(ns.max(1.0))
@@ -86,9 +86,9 @@ pub(crate) mod counted {
     use super::Duration;
     use std::cell::Cell;
 
-    /// Nanoseconds of a decision, and of comparing boxes with those of the previous frame, between cold caches. Medians
-    /// of `sapwise run` on the Granite Rapids host of `datasets/`: 5 µs with two methods on two threads (8 µs in the
-    /// largest frames of `fragmentation`) and 1.5 to 3.9 µs.
+    /// Nanoseconds of a decision, and of comparing boxes with those of the previous frame, between cold caches.
+    /// Medians of `sapwise run` on the Granite Rapids host of `datasets/`: 5 µs with two methods on two threads (8 µs
+    /// in the largest frames of `fragmentation`) and 1.5 to 3.9 µs.
     pub(crate) const DECISION_NS: f64 = 5_000.0;
     pub(crate) const LOOK_NS: f64 = 3_000.0;
 

@@ -76,12 +76,12 @@ pub struct CostTerm {
     pub unit_ns: f64,
 }
 
-/// One load under which many costs are computed: what they have in common is computed once.
+/// A load under which many costs are computed. Their common parts are computed once.
 pub(crate) struct Frame<'a> {
     counts: Counts<'a>,
-    /// Of the first places that were asked for; the methods of a tuning share theirs.
+    /// Similarity to the first places that a residual had. The methods of a tuning share their places.
     likeness: OnceCell<(Arc<Places>, Likeness)>,
-    /// Costs of works, which the algorithms of a method share.
+    /// Costs of works. The algorithms of a method share their work.
     known: [Cell<Option<(&'a Work, f64)>>; 8],
 }
 
@@ -90,7 +90,7 @@ impl<'a> Frame<'a> {
         Self { counts: Counts::new(load), likeness: OnceCell::new(), known: [const { Cell::new(None) }; 8] }
     }
 
-    /// The factor of a residual on a cost.
+    /// Returns the factor of a residual on a cost.
     fn factor(&self, residual: Option<&Residual>) -> f64 {
         let Some(residual) = residual else { return 1.0 };
         let places = &residual.places;

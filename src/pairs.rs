@@ -81,10 +81,10 @@ impl Pairs {
 
     /// Sets the most pairs that may be stored, 8 bytes each, or lifts that limit.
     ///
-    /// A frame with more wanted pairs is [`Error::TooManyPairs`]. The built-in algorithms stop soon after the limit, so
-    /// the number of pairs is unknown then. On `k` threads, `k` above 1, an algorithm may hold up to `8 k + 1` times
-    /// the limit while it works, because each task has its own list. `pair-cache` also keeps up to 32 pairs for each
-    /// box, and memory for at most five times as many, whatever the limit.
+    /// A frame with more wanted pairs is [`Error::TooManyPairs`]. The built-in algorithms stop soon after the limit,
+    /// so the number of pairs is unknown then. On `k` threads, `k` above 1, an algorithm may hold up to `8 k + 1`
+    /// times the limit while it works, because each task has its own list. `pair-cache` also keeps up to 32 pairs for
+    /// each box, and memory for at most five times as many, whatever the limit.
     pub fn set_limit(&mut self, limit: Option<usize>) {
         self.limit = limit;
     }
@@ -109,7 +109,7 @@ impl Pairs {
         self.filter.as_mut().map(|screen| Arc::make_mut(screen).filter_mut())
     }
 
-    /// Returns what tells whether the filter is another one in a later frame.
+    /// Returns the state of the filter, to compare with that of a later frame.
     #[doc(hidden)]
     pub fn filter_state(&self) -> FilterState {
         FilterState(self.filter.as_ref().map_or_else(Weak::new, Arc::downgrade))
@@ -148,9 +148,9 @@ impl Pairs {
     /// Returns the number of pairs that the search of the last frame found: the wanted ones, and those that only the
     /// filter dropped.
     ///
-    /// Without a filter this is [`len`](Self::len). With one it depends on the algorithm: `brute`, `sap` and `grid-sap`
-    /// find unwanted pairs that `bvh` and `pair-cache` rule out earlier. GPUs do not count them, unless the filter
-    /// does not fit into a buffer and the host tests the pairs.
+    /// Without a filter this is [`len`](Self::len). With one it depends on the algorithm: `brute`, `sap` and
+    /// `grid-sap` find unwanted pairs that `bvh` and `pair-cache` rule out earlier. GPUs do not count them, unless the
+    /// filter does not fit into a buffer and the host tests the pairs.
     pub fn overlapping(&self) -> u64 {
         self.len as u64 + self.unwanted
     }

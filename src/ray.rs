@@ -10,9 +10,9 @@
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
-    /// Where it begins.
+    /// The point at `t = 0`.
     pub origin: [f32; 3],
-    /// Where it leads. The length is the unit of `t`. The reciprocal of a component below 2.9e-39 is beyond `f32`, and
+    /// The direction; its length is the unit of `t`. The reciprocal of a component below 2.9e-39 is beyond `f32`, and
     /// the component counts as zero.
     pub direction: [f32; 3],
     /// The highest `t`, infinite if the ray has no end.

@@ -15,7 +15,8 @@ type Factory = Arc<dyn Fn() -> Made + Send + Sync>;
 
 /// All known algorithms, each with the reason if it can't run here.
 ///
-/// A registry starts with the built-in algorithms. Those that a user adds are swept, modelled and chosen like the rest.
+/// A registry starts with the built-in algorithms. Those that a user adds are swept, modelled and chosen like the
+/// rest.
 ///
 /// ```
 /// use sapwise::{Aabb, BroadPhase, Pairs, Registry};
@@ -64,8 +65,8 @@ impl Registry {
         Self::with_cores(usable_cores())
     }
 
-    /// Makes a registry of the built-in algorithms on 1, 2, 4, ... and `cores` threads. Any number up to `cores` can be
-    /// [created](Self::create). `cores` may exceed the cores of this machine, for tests.
+    /// Makes a registry of the built-in algorithms on 1, 2, 4, ... and `cores` threads. Any number up to `cores` can
+    /// be [created](Self::create). `cores` may exceed the cores of this machine, for tests.
     pub fn with_cores(cores: u32) -> Self {
         let mut registry = Self {
             entries: Vec::new(),
@@ -204,7 +205,7 @@ impl Registry {
         }
     }
 
-    /// Returns the threads that algorithms created from now on may use, as many as they can have.
+    /// Returns the most threads that an algorithm created from now on can have.
     pub(crate) fn most_workers(&self, method: &'static str) -> Workers {
         let most = (1..=self.cores).rev().find(|&k| self.threads.unavailable(k, self.cores).is_none());
         Workers::new(method, most.unwrap_or(1), &self.threads)
@@ -250,8 +251,8 @@ impl Registry {
         }
     }
 
-    /// Makes an instance of an algorithm: a listed one, a built-in one on any number of CPU threads up to the most that
-    /// is listed, or one that a [source](Self::add_source) makes without listing it.
+    /// Makes an instance of an algorithm: a listed one, a built-in one on any number of CPU threads up to the most
+    /// that is listed, or one that a [source](Self::add_source) makes without listing it.
     ///
     /// # Errors
     /// [`Error::UnknownAlgorithm`]. [`Error::Unavailable`], for example if a file from a larger machine names more
@@ -291,7 +292,7 @@ impl fmt::Debug for Registry {
 }
 
 /// Returns the number of threads that may run at once on this machine, with affinity and cgroup quota respected; 1 if
-/// the system does not tell.
+/// the system does not report it.
 pub fn usable_cores() -> u32 {
     std::thread::available_parallelism().map_or(1, |n| u32::try_from(n.get()).unwrap_or(u32::MAX))
 }

@@ -16,9 +16,11 @@ pub use crate::cost::{CostCurve, CostTerm, Product, Term};
 pub use crossover::Crossover;
 pub use error::TuningError;
 
-/// [`Tuning::usual`] runs `k` threads from this times `k`² objects. A frame of `n` objects on `k` threads takes `a n
-/// / k + b k`, where `b` wakes one thread and waits for it. So `k` threads beat half as many from `n = (b / 2a) k²`
-/// on. On the machines of the first reports two threads of `pair-cache` save a fifth from 10 000 objects on.
+/// [`Tuning::usual`] runs `k` threads from this number times `k`² objects on.
+///
+/// A frame of `n` objects on `k` threads takes `a n / k + b k`; `b` is the time to wake one thread and wait for it. So
+/// `k` threads are faster than `k / 2` from `n = (b / 2a) k²` on. On the machines of the first reports two threads of
+/// `pair-cache` save a fifth from 10 000 objects on.
 const OBJECTS_OF_A_THREAD_SQUARED: u32 = 2500;
 
 /// The most threads of [`Tuning::usual`]. Sixteen begin at 640 000 objects, where memory bandwidth bounds a frame.
@@ -62,7 +64,7 @@ pub struct Tuning {
 }
 
 named! {
-    /// Where tuning came from.
+    /// The origin of a tuning.
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
     #[non_exhaustive]
     pub enum Source("source of tuning") {
@@ -103,19 +105,19 @@ pub struct AlgorithmCost {
 }
 
 impl Step {
-    /// `algorithm`, from this many objects up.
+    /// Makes the step to `algorithm` from `from_objects` objects up.
     pub fn new(from_objects: u32, algorithm: AlgorithmId) -> Self {
         Self { from_objects, algorithm }
     }
 }
 
 impl AlgorithmCost {
-    /// The cost of a revision of an algorithm.
+    /// Makes the cost of a revision of an algorithm.
     pub fn new(algorithm: AlgorithmId, revision: u32, curve: CostCurve, spread_ln: f64) -> Self {
         Self { algorithm, revision, curve, spread_ln }
     }
 
-    /// Its residuals: of the work, of its fallback, and of what frames have shown.
+    /// Returns its residuals: of the work, of the whole curve, and of the fallback.
     pub(crate) fn residuals(&self) -> impl Iterator<Item = &Residual> {
         let fallback = self.curve.work.fallback.iter().filter_map(|f| f.work.residual.as_ref());
         self.curve.work.residual.iter().chain(&self.curve.residual).chain(fallback)
@@ -123,7 +125,7 @@ impl AlgorithmCost {
 }
 
 impl Tuning {
-    /// A tuning of hand-written thresholds.
+    /// Makes a tuning of hand-written steps.
     ///
     /// ```
     /// use sapwise::Tuning;
@@ -135,17 +137,17 @@ impl Tuning {
     /// ```
     ///
     /// # Errors
-    /// When the list is empty, does not begin at 0 or is not ascending.
+    /// The list is empty, does not begin at 0 or does not ascend.
     pub fn from_steps(steps: Vec<Step>) -> Result<Self, TuningError> {
         let tuning = Self { steps, ..Self::empty(Source::Default) };
         tuning.defect().map_or(Ok(tuning), Err)
     }
 
-    /// A tuning for an unknown machine: thresholds in the number of objects.
+    /// Returns a tuning for an unknown machine: steps by the number of objects.
     ///
-    /// They are the rounded crossovers of `uniform` on the machines of the first reports, which have two cores. More
-    /// than two threads are extrapolated, with more work for each thread. Another machine has other crossovers:
-    /// predict or measure them.
+    /// The steps are the rounded crossovers of `uniform` on the machines of the first reports, which have two cores.
+    /// Those of more than two threads are extrapolated, with more work for each thread. Another machine has other
+    /// crossovers: predict or measure them.
     pub fn usual(registry: &Registry) -> Self {
         let step = |from_objects, method, threads| Step { from_objects, algorithm: AlgorithmId::cpu(method, threads) };
         let mut steps = vec![step(0, "brute", 1), step(80, "pair-cache", 1)];
@@ -157,11 +159,11 @@ impl Tuning {
         Self { steps, scenario: "uniform".to_owned(), ..Self::empty(Source::Default) }
     }
 
-    /// A tuning of cost curves, with `steps` and `crossovers` along `loads`, which ascend by objects.
+    /// Makes a tuning of cost curves, with `steps` and `crossovers` along `loads`, which ascend by objects.
     ///
-    /// Loads between these are interpolated, so a handful a decade is enough. A field narrower than 3 % in objects
-    /// may be missed, and an algorithm that is cheaper by less than 2 % has none. The interval of a crossover holds
-    /// the loads at which the logarithms of the two costs differ by less than [`NORMAL_90`](crate::stats::NORMAL_90)
+    /// Loads in between are interpolated, so a handful a decade is enough. A field narrower than 3 % in objects may be
+    /// missed. An algorithm that is cheaper by less than 2 % gets no field. The interval of a crossover contains the
+    /// loads at which the logarithms of the two costs differ by less than [`NORMAL_90`](crate::stats::NORMAL_90)
     /// standard deviations.
     pub fn from_costs(source: Source, scenario: &str, costs: Vec<AlgorithmCost>, loads: &[Load]) -> Self {
         let spreads: Vec<f64> = costs.iter().map(|c| c.spread_ln).collect();
@@ -173,8 +175,8 @@ impl Tuning {
         tuning
     }
 
-    /// As [`Tuning::from_costs`], with intervals from `spread`: for two positions in `costs` and a load, it returns
-    /// the standard deviation of the logarithm of the ratio of the two costs. Describe it in
+    /// Does the same as [`Tuning::from_costs`], with intervals from `spread`. This gets two positions in `costs` and a
+    /// load, and returns the standard deviation of the logarithm of the ratio of the two costs. Describe it in
     /// [`Tuning::interval_basis`].
     pub fn from_costs_with(
         source: Source,
@@ -212,7 +214,8 @@ impl Tuning {
         }
     }
 
-    /// The algorithms that this tuning may choose: those of `costs` in their order, else those of `steps`.
+    /// Returns the algorithms that this tuning may choose: those of `costs` in their order; without costs, those of
+    /// `steps`.
     pub fn algorithms(&self) -> Vec<&AlgorithmId> {
         let mut list: Vec<&AlgorithmId> = self.costs.iter().map(|c| &c.algorithm).collect();
         for step in self.steps.iter().filter(|_| self.costs.is_empty()) {
@@ -223,13 +226,16 @@ impl Tuning {
         list
     }
 
-    /// The tuning with `brute` on one thread and `pair-cache` as the only built-in methods on the CPU. `pair-cache`
-    /// contains `bvh`: it chooses by its own times between kept pairs and a tree from scratch. Without `sap` and
-    /// `grid-sap` the best of the others takes 1.001 to 1.004 times the best of all over the reports of `datasets/`
-    /// (1.015 at the portable SIMD level). `pair-cache` takes their fields. At 1785 points of 1500
-    /// boxes or more, `brute` on several threads was never the fastest.
+    /// Returns the tuning with `brute` on one thread and `pair-cache` as the only built-in methods on the CPU.
+    /// `pair-cache` takes the fields of the others.
     ///
-    /// Unchanged unless it has costs of `bvh` on the CPU, and of `pair-cache` on the same numbers of threads.
+    /// `pair-cache` contains `bvh`: it chooses by its own times between kept pairs and a tree from scratch. Without
+    /// `sap` and `grid-sap` the best of the others takes 1.001 to 1.004 times the best of all over the reports of
+    /// `datasets/` (1.015 at the portable SIMD level). At 1785 points of 1500 boxes or more, `brute` on several threads
+    /// was never the fastest.
+    ///
+    /// The tuning is unchanged unless it has costs of `bvh` on the CPU, and of `pair-cache` on the same numbers of
+    /// threads.
     #[must_use]
     pub fn for_running(mut self) -> Self {
         let stand_in = |id: &AlgorithmId| match id.method() {
@@ -263,12 +269,12 @@ impl Tuning {
         slice::cheapest(&self.costs, load, usable)
     }
 
-    /// The step that holds at a number of objects.
+    /// Returns the step for a number of objects.
     pub fn step(&self, objects: u32) -> Option<&Step> {
         self.steps[..self.steps.partition_point(|s| s.from_objects <= objects)].last()
     }
 
-    /// The first thing that makes this tuning unusable, if any.
+    /// Returns the first defect that makes this tuning unusable, if any.
     pub fn defect(&self) -> Option<TuningError> {
         // Without loads there are no steps, and the costs decide.
         let starts = self.steps.first().map_or(!self.costs.is_empty(), |s| s.from_objects == 0);

@@ -1,4 +1,4 @@
-//! What was decided for a frame, and why.
+//! The decision for a frame, and its reason.
 
 use crate::algorithm::AlgorithmId;
 use crate::load::Load;
@@ -18,18 +18,18 @@ crate::described! {
         First = "the cheapest in the first frame",
         /// It ran before and is still the cheapest.
         Stayed = "still the cheapest",
-        /// Another would be cheaper, but has not yet promised to save what the switch to it costs.
+        /// Another would be cheaper, but the switch to it would not have paid for itself yet.
         Hysteresis = "no longer the cheapest, but a switch would not have paid yet",
-        /// It became cheaper than the one before, by more than the switch costs.
+        /// It became cheaper than the previous one, by more than the price of the switch.
         Switched = "cheaper than the one before by more than the switch costs",
-        /// It is not the cheapest: it runs in this frame to find out what it costs.
+        /// It is not expected to be the cheapest: a trial measures its cost.
         Explored = "not the cheapest, tried to learn what it costs",
-        /// The one that was chosen failed in this frame.
+        /// The chosen one failed in this frame.
         FellBack = "in place of one that failed",
     }
 }
 
-/// The last decision and what it rested on. As a text it is one sentence for people, whose wording may change.
+/// The last decision and its basis. Its text is one sentence for people, whose wording may change.
 ///
 /// ```
 /// use sapwise::{Aabb, Adaptive, BroadPhase, Pairs, Reason, Registry, Tuning};
@@ -47,19 +47,18 @@ crate::described! {
 pub struct Decision<'a> {
     /// The algorithm that ran.
     pub algorithm: &'a AlgorithmId,
-    /// Its expected cost in nanoseconds, corrected by what was learned; `None` where only the number of objects
-    /// decides.
+    /// Its expected cost in nanoseconds, with learned corrections; `None` if the number of objects alone decides.
     pub predicted_ns: Option<f64>,
-    /// What the frame took in nanoseconds. `None` where it was not timed: in frames so short that the clock would
-    /// cost more than 0.25 % of them only some are.
+    /// The time of the frame in nanoseconds, `None` if it was not timed. Of frames so short that reading the clock
+    /// takes more than 0.25 %, only some are timed.
     pub measured_ns: Option<f64>,
     /// The cheapest of the others and its expected cost in nanoseconds.
     pub runner_up: Option<(&'a AlgorithmId, f64)>,
-    /// Why it was chosen.
+    /// The reason for the choice.
     pub reason: Reason,
-    /// Where the costs came from.
+    /// The origin of the costs.
     pub source: Source,
-    /// The load that was estimated.
+    /// The estimated load.
     pub load: Load,
 }
 
@@ -80,7 +79,7 @@ impl fmt::Display for Decision<'_> {
     }
 }
 
-/// Nanoseconds, as people read them.
+/// Nanoseconds, displayed in a readable unit.
 struct Time(f64);
 
 impl fmt::Display for Time {
@@ -93,7 +92,7 @@ impl fmt::Display for Time {
     }
 }
 
-/// A decision by position among the candidates, without a copy of any name.
+/// A decision, with candidates by position, so that no name is copied.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Choice {
     pub(super) chosen: usize,

@@ -2,14 +2,14 @@
 
 use crate::broad_phase::FrameWork;
 
-/// Nanoseconds of reading the clock twice between cold caches, and the share of the time that this may take.
+/// Nanoseconds to read the clock twice with cold caches, and the share of the time that this may take.
 const CLOCK_NS: f64 = 100.0;
 const CLOCK_SHARE: f64 = 0.0025;
-/// At least one frame in this many is timed.
+/// Most frames from one timed frame to the next.
 const MOST_APART: f64 = 32.0;
 
-/// After this many timed frames, and this share of the time until the next decision, frames call for a decision if
-/// their mean is off by this factor.
+/// A decision is due early if the mean time of frames is off by the factor `OFF`, after at least `ENOUGH` timed frames
+/// and the share `EARLIEST` of the time until the next decision.
 const ENOUGH: u32 = 8;
 const EARLIEST: f64 = 0.25;
 const OFF: f64 = 1.2;
@@ -18,25 +18,25 @@ const OFF: f64 = 1.2;
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Epoch {
     pub(super) frames: u32,
-    /// Number, nanoseconds and work (in mean frames) of the timed ones that did not stand out.
+    /// Of the timed frames that did not stand out: their number, nanoseconds, and work in mean frames.
     pub(super) timed: u32,
     pub(super) ns: f64,
     pub(super) work: f64,
-    /// One frame in this many is timed.
+    /// Frames from one timed frame to the next.
     apart: u32,
-    /// Expected nanoseconds of a mean frame, and those above which a frame stands out.
+    /// Expected nanoseconds of a mean frame, and the nanoseconds above which a frame stands out.
     mean_ns: f64,
     most_ns: f64,
 }
 
 impl Epoch {
-    /// An epoch without a frame.
+    /// Makes an epoch without a frame.
     pub(super) fn expecting(mean_ns: f64, most_ns: f64) -> Self {
         let apart = (CLOCK_NS / (CLOCK_SHARE * mean_ns)).clamp(1.0, MOST_APART) as u32;
         Self { apart, mean_ns, most_ns, ..Self::default() }
     }
 
-    /// Whether to time the next frame.
+    /// Returns whether to time the next frame.
     pub(super) fn is_timed(&self) -> bool {
         self.frames.is_multiple_of(self.apart.max(1))
     }
@@ -59,7 +59,8 @@ impl Epoch {
         self.work += work.map_or(1.0, |work| work.over_mean);
     }
 
-    /// Whether a decision is needed early: the times are far from the expectation, and a share of `rest_ns` has passed.
+    /// Returns whether a decision is due early: times are far from the expectation, and a share of `rest_ns` has
+    /// passed.
     pub(super) fn is_off(&self, rest_ns: f64) -> bool {
         let mean_ns = self.ns / f64::from(self.timed.max(1));
         if self.timed < ENOUGH || mean_ns * f64::from(self.frames) < EARLIEST * rest_ns {

@@ -1,4 +1,4 @@
-//! The algorithms to choose from, and what runs them.
+//! The instances of the algorithms to choose from.
 
 use super::warming::Place;
 use crate::aabb::Aabb;
@@ -10,23 +10,22 @@ use crate::pairs::Pairs;
 use crate::registry::{Registry, built_in};
 use crate::tuning::Tuning;
 
-/// What runs an algorithm of the tuning.
+/// An instance of an algorithm of the tuning.
 pub(crate) struct Instance {
     pub(super) place: Place,
     pub(super) id: AlgorithmId,
-    /// Whether it may wait for a driver while it gets ready.
+    /// Whether it may wait for a driver while it is prepared.
     waits: bool,
-    /// Whether it builds on the frame before.
+    /// Whether it builds on the previous frame.
     pub(super) is_incremental: bool,
-    /// Objects that its buffers are ready for.
+    /// Number of objects that its buffers are prepared for.
     pub(super) ready: usize,
-    /// The first frame since its last one that another one ran and of which it was not told; `None` while it goes on,
-    /// and before its first.
+    /// The first missed frame that was not reported to it yet; `None` while it runs, and before its first frame.
     pub(super) left_at: Option<u64>,
 }
 
 impl Instance {
-    /// Without `algorithm` it can't run.
+    /// Makes an instance, which can't run without `algorithm`.
     fn new(id: &AlgorithmId, algorithm: Option<Box<dyn BroadPhase>>) -> Self {
         let is_incremental = algorithm.as_ref().is_some_and(|algorithm| algorithm.is_incremental());
         let waits = matches!(id.backend(), Backend::Gpu(_));
@@ -34,7 +33,7 @@ impl Instance {
         Self { place, id: id.clone(), waits, is_incremental, ready: 0, left_at: None }
     }
 
-    /// Gets it ready for frames of that many objects, now.
+    /// Prepares it for frames of `objects` boxes, on this thread.
     pub(super) fn prepare(&mut self, objects: usize) {
         self.place.take_back(true);
         if let Some(algorithm) = self.place.here() {
@@ -43,9 +42,9 @@ impl Instance {
         }
     }
 
-    /// The same within a frame: what may wait for a driver does so on a thread of its own.
+    /// Prepares it within a frame: on a thread of its own if it may wait for a driver.
     pub(super) fn warm(&mut self, objects: usize) {
-        // What is away for fewer is cold once more when it comes back.
+        // If it is away for fewer objects, the caller prepares it again when it is back.
         if self.place.is_away() {
             return;
         }
@@ -57,7 +56,7 @@ impl Instance {
         }
     }
 
-    /// Finds the pairs of this frame. Returns how the frame came about where one may build on the one before.
+    /// Finds the pairs of this frame. Returns the work of the frame if the algorithm is incremental.
     pub(super) fn run(
         &mut self,
         frame: u64,
@@ -68,7 +67,7 @@ impl Instance {
         let Some(algorithm) = self.place.here() else { return Err(self.gone()) };
         if let Some(left_at) = self.left_at.filter(|&left_at| self.is_incremental && left_at < frame) {
             algorithm.missed_frames(frame - left_at);
-            // Should this frame fail, those up to it are told.
+            // If this frame fails, the frames up to it are reported already.
             self.left_at = Some(frame);
         }
         algorithm.find_pairs_with(plan, boxes, pairs)?;
@@ -90,8 +89,8 @@ impl Instance {
         Error::Unavailable { algorithm: self.id.clone(), reason: Unavailable::FailedBefore }
     }
 
-    /// How the last frame came about, where one may build on the one before. Checked once more: the fields are
-    /// anybody's to set.
+    /// Returns the work of the last frame if the algorithm is incremental. Checks it again, because its fields are
+    /// public.
     fn work(&mut self) -> Option<FrameWork> {
         let algorithm = self.place.here().filter(|_| self.is_incremental)?;
         let work = algorithm.last_frame();
@@ -99,18 +98,19 @@ impl Instance {
     }
 }
 
-/// What runs the algorithms of some tuning, and why the last of those that can't run can't.
+/// The instances of the algorithms of a tuning.
 pub struct Instances {
-    /// What made them.
+    /// The registry that made them.
     pub(super) registry: Registry,
     /// In the order of [`Tuning::algorithms`].
     pub(super) instances: Vec<Instance>,
+    /// Why the last of those that can't run can't.
     pub(super) failure: Option<Error>,
 }
 
 impl Instances {
-    /// Numbers the states that candidates keep from frame to frame; `None` for one that keeps nothing. If a method fits
-    /// its threads to a frame, its candidates have one number together, and only one of them runs.
+    /// Returns the number of the state that each candidate keeps from frame to frame; `None` if it keeps none. The
+    /// candidates of a method that fits its threads to a frame share one number, and only one of them runs.
     pub(super) fn kept(&self) -> Vec<Option<usize>> {
         let fits = |one: &Instance| built_in(&one.id).is_some_and(|method| method.fits_threads);
         let first =
@@ -122,12 +122,12 @@ impl Instances {
         self.instances.iter().enumerate().map(kept).collect()
     }
 
-    /// Which can run.
+    /// Returns which can run.
     pub(super) fn usable(&self) -> Vec<bool> {
         self.instances.iter().map(|one| one.place.is_here()).collect()
     }
 
-    /// Why none of the algorithms can run; `None` where one can.
+    /// Returns why no algorithm can run, or `None` if one can.
     pub fn failure(&mut self) -> Option<Error> {
         let none = !self.usable().contains(&true);
         none.then(|| self.failure.take().unwrap_or(Error::NoAlgorithm))

@@ -1,4 +1,4 @@
-//! The load of the next frame: from a sample now and then, scaled from the last one in between.
+//! The load of the next frame: estimated from a sample now and then, scaled from the last sample in between.
 
 use super::epoch::Epoch;
 use super::pace::{Pace, drift};
@@ -8,19 +8,19 @@ use crate::clock::counted;
 use crate::clock::{Instant, elapsed_ns};
 use crate::load::{Displacement, FramePlan, Load, Motion, is_same_pace};
 
-/// Share of the frames' time that samples may take, and that looks at the motion may take.
+/// Shares of the frames' time that samples, and that looks at the motion, may take.
 const SAMPLE_SHARE: f64 = 0.002;
 const LOOK_SHARE: f64 = 0.002;
 
-/// A sample or a look that the system interrupts would put off the next one for seconds: it counts at most this many
-/// times the previous one.
+/// The time of a sample or a look counts as at most this many times the previous one. Otherwise an interruption by the
+/// system would delay the next one for seconds.
 const COST_RISES: f64 = 2.0;
 
-/// Frames between two samples at least, unless the number of objects drifts by this much.
+/// Fewest frames between two samples, unless the number of objects [drifts](drift) by more than `DRIFTED`.
 const SAMPLE_EVERY: u32 = 32;
 const DRIFTED: f64 = 1.0 / 16.0;
 
-/// Motion shows in two consecutive frames.
+/// The state of a look at the motion, which takes two consecutive frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 enum Watch {
     #[default]
@@ -32,7 +32,7 @@ enum Watch {
 }
 
 /// Keeps the load and the motion up to date.
-// A frame without a decision looks at what stands first alone: see `Runner`.
+// A frame without a decision reads only the first fields: see `Runner`.
 #[repr(C)]
 #[derive(Debug, Clone, Default)]
 pub(super) struct LoadTracker {
@@ -40,30 +40,30 @@ pub(super) struct LoadTracker {
     watch: Watch,
     /// The last estimate.
     pub(super) load: Load,
-    /// What the last sample tells the algorithm about the frame that follows.
+    /// The plan for the next frame, from its sample.
     pub(super) plan: FramePlan,
-    /// Objects at the last sample, frames and nanoseconds since; nanoseconds of a sample.
+    /// Objects at the last sample; frames and nanoseconds since; nanoseconds of a sample.
     sampled: Option<u32>,
     pub(super) age: u32,
     since_sample_ns: f64,
     sample_ns: f64,
-    /// The last motion that was found, nanoseconds since, and nanoseconds of a look.
+    /// The motion at the last look; nanoseconds since; nanoseconds of a look.
     pub(super) motion: Option<Motion>,
     since_look_ns: f64,
     look_ns: f64,
     displacement: Displacement,
-    /// A frame has run since the last failure.
+    /// Whether a frame has run since the last failure.
     knows_pairs: bool,
 }
 
 impl LoadTracker {
-    /// Sets the load to that of a first frame, of which only the number of boxes is known.
+    /// Sets the load of a first frame from the number of its boxes alone.
     pub(super) fn begin(&mut self, boxes: &[Aabb]) {
         self.load = Load::of_objects(count(boxes)).with_motion(Motion::MOST);
         self.watch = Watch::Due;
     }
 
-    /// Brings the load up to date. Returns the nanoseconds of the sample, if one was due: it has a budget of its own.
+    /// Updates the load. Returns the nanoseconds of the sample, 0 if none was due: samples have a budget of their own.
     pub(super) fn update(&mut self, boxes: &[Aabb]) -> f64 {
         let started = Instant::now();
         let objects = count(boxes);
@@ -105,14 +105,14 @@ impl LoadTracker {
         let motion = self.displacement.motion(boxes);
         #[cfg(test)]
         counted::spend(counted::LOOK_NS);
-        // To remember the boxes takes about as long as to compare them.
+        // Remembering the boxes takes about as long as comparing them.
         self.look_ns = capped(2.0 * elapsed_ns(started), self.look_ns);
         let same = self.motion.zip(motion).is_some_and(|(before, now)| is_same_pace(before.moved, now.moved));
         (self.motion, self.since_look_ns, self.watch) = (motion, 0.0, Watch::Resting);
         !same
     }
 
-    /// Takes in a frame that needed no decision.
+    /// Records a frame that needed no decision.
     pub(super) fn went_on(&mut self, boxes: &[Aabb], pairs: u64, epoch: &Epoch) {
         self.pace.ran(count(boxes), pairs);
         if self.look(boxes) {
@@ -124,14 +124,14 @@ impl LoadTracker {
         }
     }
 
-    /// Takes in a frame that was decided, or belongs to a trial, or stood out.
+    /// Records a frame that was decided, belongs to a trial, or stood out.
     pub(super) fn ran(&mut self, boxes: &[Aabb], pairs: u64) {
         self.look(boxes);
-        // What was worked out for this frame holds for no other.
+        // The plan holds for this frame only.
         self.plan = FramePlan::default();
         self.pace.ran(count(boxes), pairs);
         self.knows_pairs = true;
-        // Not when it is decided: a frame may be decided twice before it runs.
+        // Not at the decision, because a frame may be decided twice before it runs.
         let pays = self.look_ns > 0.0 && self.since_look_ns * LOOK_SHARE >= self.look_ns;
         if self.watch == Watch::Due || pays {
             self.displacement.watch(boxes);
@@ -139,14 +139,14 @@ impl LoadTracker {
         }
     }
 
-    /// Takes in the time of frames.
+    /// Records the time of frames.
     pub(super) fn passed(&mut self, frames: u32, ns: f64) {
         self.age = self.age.saturating_add(frames);
         self.since_sample_ns += ns;
         self.since_look_ns += ns;
     }
 
-    /// After a frame that failed, nothing is known of the previous one.
+    /// Records a failed frame: nothing is known about the previous frame any more.
     pub(super) fn failed(&mut self) {
         (self.knows_pairs, self.motion, self.watch) = (false, None, Watch::Resting);
         self.sampled = None;
@@ -154,12 +154,12 @@ impl LoadTracker {
     }
 }
 
-/// Boxes of a frame; an algorithm refuses more than this can count.
+/// Returns the number of boxes. Algorithms refuse more than 32 bits can count.
 pub(super) fn count(boxes: &[Aabb]) -> u32 {
     u32::try_from(boxes.len()).unwrap_or(u32::MAX)
 }
 
-/// A count that grows with the objects.
+/// Scales a count with the number of objects.
 fn scaled(count: f64, objects: u32, before: u32) -> f64 {
     if before == 0 { count } else { count * f64::from(objects) / f64::from(before) }
 }

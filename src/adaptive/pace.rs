@@ -1,16 +1,16 @@
 //! When to decide: seldom in short frames, soon if the number of objects changes.
 
-/// Share of the frames' time that decisions may take, and by how much that rises with the [`drift`] of the objects
+/// Share of the frames' time that decisions may take, and its rise for each unit of [`drift`] of the number of objects
 /// since the last decision.
 const SHARE: f64 = 0.004;
 const SHARE_OF_DRIFT: f64 = 0.02;
 /// Most frames between two decisions.
 const MOST_FRAMES: f64 = 1024.0;
-/// A jump in the number of objects calls for a decision at once: by more than this part of the previous frame's number,
-/// and by more than this many objects.
+/// A decision is due at once if the number of objects jumps: by more than one part in `JUMP_PART` of the previous
+/// frame's number, and by more than `JUMP_LEAST`.
 const JUMP_PART: u32 = 4;
 const JUMP_LEAST: u32 = 16;
-/// Weight of a decision in the mean of what they take, and how many times the mean it counts at most.
+/// Weight of a decision in the mean time of decisions, and the most times that mean as which it counts.
 const WEIGHT: f64 = 1.0 / 8.0;
 const MOST_RISE: f64 = 4.0;
 
@@ -23,12 +23,12 @@ pub(super) fn drift(objects: u32, before: u32) -> f64 {
 /// Counts the frames until the next decision.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Pace {
-    /// Objects at the last decision, objects and pairs of the last frame, and frames since that decision.
+    /// Objects at the last decision; objects of the last frame; frames since that decision; pairs of the last frame.
     objects: u32,
     pub(super) before: u32,
     frames: u32,
     pub(super) pairs_before: u64,
-    /// Frames until the next decision if nothing changes; whether something calls for it at once.
+    /// Frames until the next decision if nothing changes; whether one is due at once.
     rest: f64,
     due: bool,
     /// Mean nanoseconds of a decision, and nanoseconds of a frame.
@@ -37,14 +37,14 @@ pub(super) struct Pace {
 }
 
 impl Pace {
-    /// Whether to decide before a frame of this many objects.
+    /// Returns whether a decision is due before a frame of `objects` objects.
     pub(super) fn is_due(&self, objects: u32) -> bool {
         let jumps = objects.abs_diff(self.before) > (self.before / JUMP_PART).max(JUMP_LEAST);
         let frames = f64::from(self.frames);
         self.due || jumps || frames * (1.0 + SHARE_OF_DRIFT / SHARE * drift(objects, self.objects)) >= self.rest
     }
 
-    /// Nanoseconds until the next decision if nothing changes.
+    /// Returns the nanoseconds until the next decision if nothing changes.
     pub(super) fn rest_ns(&self) -> f64 {
         self.rest * self.frame_ns
     }
@@ -55,7 +55,7 @@ impl Pace {
         (self.before, self.pairs_before) = (objects, pairs);
     }
 
-    /// Takes in a decision for this many objects and what it took.
+    /// Records a decision for `objects` objects that took `ns`.
     pub(super) fn decided(&mut self, objects: u32, ns: f64) {
         (self.objects, self.frames, self.due) = (objects, 0, false);
         // A decision that was interrupted counts for little.
@@ -63,14 +63,14 @@ impl Pace {
         self.decision_ns = before + WEIGHT * (ns.min(MOST_RISE * before) - before);
     }
 
-    /// Sets the rest after a frame that took this long, with its limits in frames.
+    /// Sets the frames until the next decision, within limits, after a frame of `frame_ns`.
     pub(super) fn set_rest(&mut self, frame_ns: f64, (least, most): (f64, f64)) {
         self.frame_ns = frame_ns;
         let frames = (self.decision_ns / (SHARE * frame_ns.max(1.0))).min(MOST_FRAMES).floor();
         self.rest = frames.min(most).max(least);
     }
 
-    /// The next frame needs a decision.
+    /// Makes a decision due before the next frame.
     pub(super) fn wake(&mut self) {
         self.due = true;
     }

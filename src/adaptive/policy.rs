@@ -1,7 +1,7 @@
-//! Which algorithm runs the next frame: the one with the lowest predicted cost times what frames have shown.
+//! Chooses the algorithm of the next frame: the one with the lowest predicted cost after corrections.
 //!
-//! Frames show two factors, one for the class of processor and one for the candidate. A switch waits until it would
-//! have saved its price. Rare trials learn what others cost.
+//! Frames that ran give two correction factors, one for the class of processor and one for the candidate. A switch
+//! waits until it would have saved its price. Rare trials measure the cost of other candidates.
 
 use super::decision::{Choice, Reason};
 use super::epoch::Epoch;
@@ -15,67 +15,71 @@ use crate::load::Load;
 use crate::tuning::{AlgorithmCost, Step, Tuning};
 use std::sync::Arc;
 
-/// If the number of objects alone decides, the incumbent stays while its own step is within this share.
+/// If the number of objects alone decides, the incumbent stays within this share of the borders of its own step.
 const STEP_SLACK: f64 = 0.05;
 
-/// First frame of a candidate over a usual one: its memory is in no cache, its threads sleep.
+/// Cost of the first frame of a candidate over a usual one: its memory is in no cache, and its threads sleep.
 const COLD: f64 = 1.15;
-/// First frame of an incremental algorithm over a mean one, and frames of absence after which it is one.
+/// Cost of the first frame of an incremental algorithm over a mean one, and frames of others after which a frame
+/// counts as a first one.
 const FROM_NOTHING: f64 = 3.0;
 const FORGOTTEN: u64 = 3;
 
 /// Standard deviations of the logarithm of a factor before any observation: of a class of processor, of a candidate.
 const CLASS_LN: f64 = 0.32;
 const OWN_LN: f64 = 0.3;
-/// The same of one frame around its mean, and the power of the number of frames by which that of a mean falls.
+/// Standard deviation of the logarithm of the time of one frame. For a mean of `n` frames the variance is divided by
+/// `n` to the power `ALIKE`.
 const FRAME_LN: f64 = 0.2;
 const ALIKE: f64 = 0.7;
-/// The same of an epoch of any length.
+/// Least standard deviation of the logarithm of the mean time of an epoch, however long.
 const EPOCH_LN: f64 = 0.05;
-/// The same of the first frames of an incremental algorithm, and frames over which that falls to an e-th.
+/// Additional standard deviation for the first frames of an incremental algorithm, and frames over which it falls to
+/// an e-th.
 const UNSETTLED_LN: f64 = 0.4;
 const SETTLING_FRAMES: f64 = 16.0;
-/// A surprise counts at most this many standard deviations; after this many in a row to the same side, what was
-/// observed is as uncertain as at first.
+/// A surprise counts as at most `MOST_SURPRISE` standard deviations. After `NO_ACCIDENT` larger ones in a row to the
+/// same side, the corrections are as uncertain as at first.
 const MOST_SURPRISE: f64 = 3.0;
 const NO_ACCIDENT: i32 = 3;
-/// What a candidate's own factor keeps if the number of objects changes falls to an e-th over this logarithm.
+/// Change of the logarithm of the number of objects over which a candidate's own correction falls to an e-th.
 const SIZE_LN: f64 = 2.0;
 
 /// A frame stands out if it takes this many times the longest expected one.
 const STANDS_OUT: f64 = 3.0;
-/// Observed epochs after which a frame that takes far longer than expected waited for another program; before, it was
-/// expected wrongly.
+/// Observed epochs after which a frame that takes far longer than expected counts as one that waited for another
+/// program. Earlier, the expectation counts as wrong.
 const KNOWN: u32 = 4;
 
-/// A switch that saves its price within this many frames is made at once.
+/// A switch that is expected to save its price within this many frames is made at once.
 const SOON: f64 = 4.0;
 
-/// Frames of a trial: of an incremental candidate, of any other.
+/// Frames of a trial of an incremental candidate, and of any other.
 const OF_KEPT: u32 = 16;
 const OF_OTHERS: u32 = 2;
-/// A candidate is not tried if it is expected to cost this many times what the incumbent costs.
+/// A candidate is not tried if its expected cost is more than this many times that of the incumbent.
 const HOPELESS: f64 = 2.0;
-/// The tried candidate becomes the incumbent if it costs less than this share.
+/// The tried candidate becomes the incumbent if it costs less than this share of the incumbent's cost.
 const WINS: f64 = 0.97;
-/// Cost of the decisions of a trial, over that of a usual one: they evaluate no curve.
+/// Cost of the decisions of a trial over that of a usual decision: they evaluate no curve.
 const TRIAL_DECISIONS: f64 = 0.15;
 
 #[derive(Debug, Clone)]
 struct Candidate {
     usable: bool,
-    /// Number of the state that it keeps from frame to frame.
+    /// Number of the state that it keeps from frame to frame; `None` if it keeps none.
     kept: Option<usize>,
-    /// Of those that share this, the one on the most threads: it runs for all, on as many of them as it likes.
+    /// Of the candidates that share this state, the one with the most threads. It runs for all of them, and fits its
+    /// threads to each frame.
     leader: usize,
     method: usize,
     class: usize,
     width: u32,
     own: Part,
-    /// Observed epochs, and the position of its number of threads among the waits.
+    /// Observed epochs, and the position of its wait in [`Policy::waits`].
     observed: u32,
     wait: usize,
-    /// Expected nanoseconds of a mean frame: without and with what frames have shown.
+    /// Expected nanoseconds of a mean frame, without and with corrections.
     predicted_ns: f64,
     mean_ns: f64,
     /// Nanoseconds that it would have saved since it became cheaper than the incumbent.
@@ -85,7 +89,7 @@ struct Candidate {
 /// State that incremental algorithms keep from frame to frame.
 #[derive(Debug, Clone, Copy, Default)]
 struct Kept {
-    /// The last frame that kept it, and frames in a row up to that one.
+    /// The last frame that kept it, and the number of frames in a row up to that one.
     last: Option<u64>,
     run: u32,
 }
@@ -101,12 +105,12 @@ pub(super) struct Policy {
     steps: Vec<(u32, usize)>,
     pub(super) learns: bool,
     pub(super) explores: bool,
-    /// Observed epochs, and surprises in a row, counted with their sign.
+    /// Observed epochs, and surprises in a row to one side, negative if costs were lower than expected.
     observed: u64,
     surprises: i32,
     /// By class of processor and width.
     waits: Vec<Wait>,
-    /// What runs unless a trial does, and what ran last.
+    /// The candidate that runs unless a trial does, and the one that ran last.
     incumbent: Option<usize>,
     ran: Option<usize>,
     trials: Trials,
@@ -115,14 +119,14 @@ pub(super) struct Policy {
     decided: u64,
     /// Objects at the last decision.
     objects: u32,
-    /// Most frames until the next decision while a switch is pending.
+    /// Upper bound on the frames until the next decision, set while a switch is pending.
     rest: Option<f64>,
-    /// What a decision takes.
+    /// Nanoseconds of a decision.
     pub(super) decision_ns: f64,
 }
 
 impl Policy {
-    /// `kept`: as of [`Instances`](super::instances::Instances::kept).
+    /// Makes the policy of a tuning. `kept` is the result of [`Instances::kept`](super::instances::Instances::kept).
     pub(super) fn new(tuning: Tuning, kept: &[Option<usize>], usable: &[bool]) -> Self {
         let ids = tuning.algorithms();
         let (mut methods, mut classes): (Vec<&str>, Vec<BackendClass>) = (Vec::new(), Vec::new());
@@ -166,8 +170,8 @@ impl Policy {
         made
     }
 
-    /// Finds the leader of each candidate, and of the incumbent. Where the number of objects alone decides, each is its
-    /// own.
+    /// Finds the leader of each candidate, and makes that of the incumbent the incumbent. If the number of objects
+    /// alone decides, each candidate is its own leader.
     fn lead(&mut self) {
         for k in 0..self.candidates.len() {
             let shares = |&other: &usize| {
@@ -180,12 +184,12 @@ impl Policy {
         self.incumbent = self.incumbent.map(|k| self.candidates[k].leader);
     }
 
-    /// Whether frames have shown anything.
+    /// Returns whether there are corrections.
     pub(super) fn has_learned(&self) -> bool {
         self.observed > 0
     }
 
-    /// The costs with what frames have shown.
+    /// Returns the costs with corrections.
     pub(super) fn learned_costs(&self) -> Vec<AlgorithmCost> {
         let costs = &self.tuning.costs;
         let mut known = costs.iter().flat_map(AlgorithmCost::residuals).map(|residual| &residual.places);
@@ -199,12 +203,12 @@ impl Policy {
         costs.iter().enumerate().map(learned).collect()
     }
 
-    /// Whether the number of objects tells the algorithm of a first frame.
+    /// Returns whether a first frame can be decided by the number of objects.
     pub(super) fn has_steps(&self) -> bool {
         self.steps.iter().any(|&(_, k)| self.candidates[k].usable)
     }
 
-    /// Whether the number of objects alone decides.
+    /// Returns whether the number of objects alone decides.
     pub(super) fn is_by_count(&self) -> bool {
         self.tuning.costs.is_empty()
     }
@@ -219,12 +223,12 @@ impl Policy {
         self.lead();
     }
 
-    /// A frame failed: the next one runs the incumbent.
+    /// Records a failed frame: the next one runs the incumbent.
     pub(super) fn failed(&mut self) {
         self.trials.running = None;
     }
 
-    /// Other instances take the place of the previous ones.
+    /// Records that other instances replace the previous ones.
     pub(super) fn remade(&mut self, kept: &[Option<usize>], usable: &[bool]) {
         for (c, (&kept, &usable)) in self.candidates.iter_mut().zip(kept.iter().zip(usable)) {
             (c.kept, c.usable, c.saved_ns) = (kept, usable, 0.0);
@@ -265,7 +269,7 @@ impl Policy {
         })
     }
 
-    /// Chooses for the first frame, of which only the number of objects is known.
+    /// Chooses for the first frame, by the number of its objects alone.
     pub(super) fn choose_first(&mut self, objects: u32) -> Option<Choice> {
         (self.decided, self.objects) = (self.frame, objects);
         self.choose_by_count(objects)
@@ -281,7 +285,7 @@ impl Policy {
         self.classes[c.class].mean(self.frame) + c.own.mean(self.frame)
     }
 
-    /// Works out what each candidate is expected to cost.
+    /// Computes the expected cost of each candidate.
     fn expect(&mut self, load: &Load) {
         let growth_ln = (f64::from(load.objects.max(1)) / f64::from(self.objects.max(1))).ln().abs();
         self.objects = load.objects;
@@ -298,7 +302,7 @@ impl Policy {
         (0..self.candidates.len()).for_each(|k| self.correct(k));
     }
 
-    /// Corrects the expected cost of a candidate by what frames have shown.
+    /// Corrects the expected cost of a candidate.
     fn correct(&mut self, candidate: usize) {
         let factor = self.correction_ln(candidate).exp();
         let c = &mut self.candidates[candidate];
@@ -310,38 +314,40 @@ impl Policy {
         usable.min_by(|&a, &b| self.candidates[a].mean_ns.total_cmp(&self.candidates[b].mean_ns))
     }
 
-    /// Whether a candidate may be chosen.
+    /// Returns whether a candidate may be chosen.
     pub(super) fn is_choice(&self, candidate: usize) -> bool {
         let c = &self.candidates[candidate];
         c.usable && c.leader == candidate
     }
 
-    /// Whether a candidate finds its state as the previous frames left it.
+    /// Returns whether a candidate finds its state as recent frames left it.
     fn remembers(&self, candidate: usize) -> bool {
         let last = self.candidates[candidate].kept.and_then(|kept| self.kept[kept].last);
         last.is_some_and(|last| self.frame - last <= FORGOTTEN)
     }
 
-    /// Expected nanoseconds of a first frame of a candidate.
+    /// Returns the expected nanoseconds of a first frame of a candidate.
     fn first_ns(&self, candidate: usize) -> f64 {
         let c = &self.candidates[candidate];
         c.mean_ns * if c.kept.is_some() { FROM_NOTHING } else { COLD }
     }
 
-    /// Extra nanoseconds of the first frame of a candidate, if it ran next.
+    /// Returns the extra nanoseconds of the first frame if a candidate runs next.
     fn enter_ns(&self, candidate: usize) -> f64 {
         let mean_ns = self.candidates[candidate].mean_ns;
         if self.remembers(candidate) { (COLD - 1.0) * mean_ns } else { self.first_ns(candidate) - mean_ns }
     }
 
-    /// The price of a switch: the first frame of the new one, and later that of the old one if it must begin again.
+    /// Returns the price of a switch: the extra time of the first frame of the new candidate, and later that of the
+    /// old one if its state is lost.
     fn price_ns(&self, from: usize, to: usize) -> f64 {
         let leave_ns = if self.remembers(from) { self.first_ns(from) - self.candidates[from].mean_ns } else { 0.0 };
         leave_ns + self.enter_ns(to)
     }
 
-    /// Whether to switch: once the frames since the other became cheaper would have saved the price. If costs hold
-    /// still, that loses at most twice what knowing the future would; if they flicker, it saves nothing for long.
+    /// Returns the next incumbent and the reason. Switches when the frames since another candidate became cheaper
+    /// would have saved the price. If costs stay constant, the loss is at most twice that of a decision with knowledge
+    /// of the future. If they flicker, no switch happens for long.
     fn settle(&mut self, incumbent: usize, best: usize, frames: f64) -> (usize, Reason) {
         let now_ns = self.candidates[incumbent].mean_ns;
         for c in &mut self.candidates {
@@ -359,21 +365,21 @@ impl Policy {
         if let Some(k) = self.cheapest(pays) {
             return (k, Reason::Switched);
         }
-        // A decision that comes later than the switch has paid loses the gain of each frame in between.
+        // If the next decision comes after the switch would have paid, each frame in between loses the gain.
         let left_ns = (self.price_ns(incumbent, best) - self.candidates[best].saved_ns).max(self.decision_ns);
         self.rest = Some(left_ns / (now_ns - self.candidates[best].mean_ns)).filter(|frames| *frames > 0.0);
         (incumbent, Reason::Hysteresis)
     }
 
-    /// Frames until the next decision, at least and at most: a trial is not disturbed, and a pending switch not
-    /// missed.
+    /// Returns the least and the most frames until the next decision, so that it neither disturbs a trial nor misses a
+    /// pending switch.
     pub(super) fn rest(&self) -> (f64, f64) {
         let least = self.trials.running.map_or(0.0, |trial| f64::from(trial.left) + 1.0);
         (least, self.rest.unwrap_or(f64::INFINITY))
     }
 
-    /// Whether a trial of one candidate beside another tells something new: the same method on half or twice as many
-    /// threads, another method on as many, one that fits its threads, or another class of processor.
+    /// Returns whether two candidates are similar enough for a trial, or of different classes of processor: the same
+    /// method on at most twice as many threads, the same number of threads, or one of them incremental.
     fn is_near(&self, one: usize, other: usize) -> bool {
         let (one, other) = (&self.candidates[one], &self.candidates[other]);
         let (low, high) = (one.width.min(other.width), one.width.max(other.width));
@@ -385,7 +391,7 @@ impl Policy {
         self.candidates[candidate].mean_ns > HOPELESS * self.candidates[incumbent].mean_ns
     }
 
-    /// Begins the trial that is expected to save the most beyond its price, if there is one.
+    /// Begins the trial with the highest expected saving beyond its price, if any pays.
     fn offer_trial(&mut self, incumbent: usize) {
         let now_ns = self.candidates[incumbent].mean_ns;
         if !self.trials.may_begin(self.frame, now_ns) {
@@ -415,16 +421,17 @@ impl Policy {
         Choice { chosen, predicted_ns: Some(mean_ns(chosen)), runner_up, reason }
     }
 
-    /// An epoch of frames of a candidate.
+    /// Makes an epoch of frames of a candidate.
     pub(super) fn epoch(&self, candidate: usize) -> Epoch {
         let mean_ns = self.candidates[candidate].mean_ns;
-        // Of a candidate that was chosen by count alone nothing is expected.
+        // A candidate that was chosen by count alone has no expected cost.
         let most_ns = if mean_ns > 0.0 { STANDS_OUT * self.first_ns(candidate) } else { f64::INFINITY };
         Epoch::expecting(mean_ns, most_ns)
     }
 
-    /// Takes in a frame of a candidate that was decided, stood out or belongs to a trial, and adds it to the epoch if
-    /// it shows a usual cost. `None` for a time that the clock can't tell: it counts as expected, and shows nothing.
+    /// Records a frame of a candidate that was decided, stood out or belongs to a trial. Adds it to the epoch if its
+    /// cost is a usual one. If `ns` is `None`, the clock was too coarse: the frame counts as expected and adds
+    /// nothing.
     pub(super) fn ran(&mut self, candidate: usize, ns: Option<f64>, work: Option<FrameWork>, epoch: &mut Epoch) {
         let frame = self.frame + u64::from(epoch.frames);
         let entered = self.ran.replace(candidate) != Some(candidate);
@@ -435,7 +442,7 @@ impl Policy {
         let (timed, ns) = (ns.is_some(), ns.unwrap_or(c.mean_ns));
         let now_ns = self.incumbent.map_or(0.0, |k| self.candidates[k].mean_ns);
         self.trials.ran(ns - now_ns);
-        // A first frame shows no usual cost: if nothing is kept, its excess is known.
+        // A first frame has no usual cost. Its excess is known if the candidate keeps no state.
         let cold = entered && kept.is_none();
         let most_ns = if observed < KNOWN { f64::INFINITY } else { STANDS_OUT * first_ns };
         let waited_ns = (ns - most_ns).max(0.0);
@@ -447,7 +454,7 @@ impl Policy {
         }
     }
 
-    /// Takes in an epoch of a candidate, whose last frame came about by `work`.
+    /// Learns from an epoch of a candidate. `work` is that of its last frame.
     pub(super) fn observe(&mut self, candidate: usize, epoch: &Epoch, work: Option<FrameWork>) {
         let c = &self.candidates[candidate];
         let mut unsettled = 0.0;
@@ -488,17 +495,17 @@ impl Policy {
         }
     }
 
-    /// Whether a trial runs.
+    /// Returns whether a trial runs.
     pub(super) fn tries(&self) -> bool {
         self.trials.running.is_some()
     }
 
-    /// Whether a trial runs that is over.
+    /// Returns whether the running trial is over.
     pub(super) fn ends_trial(&self) -> bool {
         self.trials.running.is_some_and(|trial| trial.is_over())
     }
 
-    /// Ends the trial: the tried candidate or the incumbent runs on. Looks at no load.
+    /// Ends the trial, and chooses the tried candidate or the incumbent. Needs no load.
     pub(super) fn end_trial(&mut self) -> Option<Choice> {
         let trial = self.trials.running.take()?;
         let incumbent = self.incumbent?;
@@ -510,13 +517,13 @@ impl Policy {
         Some(self.choice(incumbent, Reason::Stayed))
     }
 
-    /// The step that holds at this number of objects, or the nearest below or above that can run.
+    /// Chooses the step for this number of objects, or the nearest one below, then above, that can run.
     fn choose_by_count(&mut self, objects: u32) -> Option<Choice> {
         let begun = |objects: u32| self.steps.partition_point(|&(from, _)| from <= objects);
         let (below, above) = self.steps.split_at(begun(objects));
         let mut leaders = below.iter().rev().chain(above).map(|&(_, k)| self.candidates[k].leader);
         let chosen = leaders.find(|&k| self.candidates[k].usable)?;
-        // Only the incumbent's own borders have a slack.
+        // The slack applies only to the borders of the incumbent's own steps.
         let holds = |incumbent: usize, share: f64| {
             let step = begun((f64::from(objects) * share) as u32).checked_sub(1);
             step.is_some_and(|k| self.steps[k].1 == incumbent)
@@ -533,17 +540,17 @@ impl Policy {
     }
 }
 
-/// Variance of the logarithm of the mean of some frames.
+/// Returns the variance of the logarithm of the mean time of some frames.
 fn noise(frames: u32) -> f64 {
     FRAME_LN * FRAME_LN / f64::from(frames).powf(ALIKE)
 }
 
-/// Nothing is kept yet.
+/// Returns the states before the first frame.
 fn states(kept: &[Option<usize>]) -> Vec<Kept> {
     vec![Kept::default(); kept.iter().flatten().max().map_or(0, |most| most + 1)]
 }
 
-/// The position of something in a list, which it joins if it is new.
+/// Returns the position of a value in a list, and appends it if it is new.
 fn number<T: PartialEq>(list: &mut Vec<T>, what: T) -> usize {
     list.iter().position(|known| *known == what).unwrap_or_else(|| {
         list.push(what);

@@ -1,4 +1,4 @@
-//! Runs the frames: those that need a decision, and between two decisions those that go on.
+//! Runs the frames, with a decision or with the algorithm of the previous frame.
 
 use super::decision::{Choice, Decision, Reason};
 use super::epoch::Epoch;
@@ -14,23 +14,23 @@ use crate::pairs::Pairs;
 use crate::registry::Registry;
 use crate::tuning::{Source, Tuning};
 
-/// A runner-up that costs at most this many times what the choice costs reserves its buffers.
+/// A runner-up is prepared if its cost is at most this many times that of the choice.
 const WARM_WITHIN: f64 = 1.5;
 
-/// From this many boxes on a first frame is sampled: a sample then takes less than a frame, and a wrong choice may take
-/// many.
+/// Fewest boxes for which a first frame is sampled. Then a sample takes less than a frame, and a wrong choice may cost
+/// several.
 const FIRST_SAMPLED: usize = 1000;
 
 /// The algorithms, the choice among them, and what is known of the frames.
-// A frame without a decision looks at what stands first and at the beginning of `tracker` alone: between two frames
-// of a program all of it leaves the caches, and ten lines of memory here and there take as long as some frames.
+// A frame without a decision reads only the first fields and the beginning of `tracker`. Between two frames of a
+// program all fields leave the caches, and ten scattered cache lines take as long as some frames.
 #[repr(C, align(64))]
 pub(super) struct Runner {
-    /// The next frame goes on unless the tracker calls for a decision.
+    /// Whether the next frame goes on without a decision, unless the tracker calls for one.
     steady: bool,
-    /// Another tuning may [take the place](Self::replace) of this one before any frame.
+    /// Whether another tuning may [replace](Self::replace) this one before any frame.
     pub(super) awaits: bool,
-    /// What ran last and did not fail; `None` before the first frame of these instances.
+    /// The last instance that ran and did not fail; `None` before the first frame of these instances.
     running: Option<usize>,
     /// In the order of [`Tuning::algorithms`].
     instances: Vec<Instance>,
@@ -39,15 +39,15 @@ pub(super) struct Runner {
     pub(super) work: Option<FrameWork>,
     epoch: Epoch,
     pub(super) tracker: LoadTracker,
-    /// What made the instances.
+    /// The registry that made the instances.
     registry: Registry,
     pub(super) policy: Policy,
     choice: Option<Choice>,
-    /// An instance gets ready on a thread of its own.
+    /// Whether an instance is prepared on a thread of its own.
     any_away: bool,
-    /// The most objects that a caller prepared for.
+    /// The most objects for which a caller prepared.
     prepared: usize,
-    /// Boxes of the frame that was decided and has not run yet.
+    /// Number of boxes of a frame that was decided and has not run yet.
     decided: Option<usize>,
 }
 
@@ -56,7 +56,7 @@ impl Runner {
         Self::with(policy(tuning, &made), made)
     }
 
-    /// Makes the same algorithms anew. The first frame estimates the load; what was learned stays.
+    /// Makes the same algorithms anew. The first frame estimates the load. Learned corrections stay.
     pub(super) fn twin(&self) -> Self {
         let (mut policy, made) = (self.policy.clone(), Instances::of(&self.policy.tuning, &self.registry));
         policy.remade(&made.kept(), &made.usable());
@@ -82,7 +82,7 @@ impl Runner {
         }
     }
 
-    /// Whether another tuning may come before the next frame.
+    /// Returns whether another tuning may replace this one before the next frame.
     pub(super) fn is_open(&self) -> bool {
         self.awaits && self.decided.is_none()
     }
@@ -93,7 +93,7 @@ impl Runner {
         self.policy = policy(tuning, &made);
         (self.policy.learns, self.policy.explores) = (learns, explores);
         self.exchange(made);
-        // Within a frame, so that what may block gets ready on a thread of its own.
+        // As within a frame: instances that may block are prepared on threads of their own.
         self.choices().into_iter().for_each(|k| self.warm(k, self.prepared));
     }
 
@@ -110,24 +110,24 @@ impl Runner {
         (self.decided, self.choice, self.steady, self.epoch) = (None, None, false, Epoch::default());
     }
 
-    /// Whether any of the algorithms is incremental.
+    /// Returns whether any of the algorithms is incremental.
     pub(super) fn is_incremental(&self) -> bool {
         self.instances.iter().any(|instance| instance.is_incremental)
     }
 
-    /// Gets those that may be chosen ready for frames of that many objects.
+    /// Prepares the instances that may be chosen for frames of `objects` boxes.
     pub(super) fn prepare(&mut self, objects: usize) {
         self.prepared = self.prepared.max(objects);
         self.take_back(true);
         self.choices().into_iter().for_each(|k| self.instances[k].prepare(objects));
     }
 
-    /// Those that may be chosen.
+    /// Returns the instances that may be chosen.
     fn choices(&self) -> Vec<usize> {
         (0..self.instances.len()).filter(|&k| self.policy.is_choice(k)).collect()
     }
 
-    /// What was decided for the last frame; `None` before the first.
+    /// Returns the decision for the last frame; `None` before the first.
     pub(super) fn last_decision(&self) -> Option<Decision<'_>> {
         self.choice.map(|c| Decision {
             algorithm: &self.instances[c.chosen].id,
@@ -140,7 +140,7 @@ impl Runner {
         })
     }
 
-    /// Decides for the next frame, which is to be of these boxes.
+    /// Decides for the next frame. The caller runs it with these boxes.
     pub(super) fn decide(&mut self, boxes: &[Aabb]) {
         self.choose(boxes);
         (self.decided, self.steady) = (Some(boxes.len()), false);
@@ -164,14 +164,14 @@ impl Runner {
         self.run_chosen(boxes, pairs)
     }
 
-    /// Whether the next frame needs a decision of its own.
+    /// Returns whether the next frame needs a decision of its own.
     fn is_due(&mut self, objects: u32) -> bool {
         self.take_back(false);
-        // By the number of objects alone a decision costs next to nothing, and depends on no clock.
+        // A decision by the number of objects alone costs next to nothing, and needs no clock.
         self.choice.is_none() || self.policy.is_by_count() || self.tracker.pace.is_due(objects)
     }
 
-    /// Takes in the frames since the last decision.
+    /// Learns from the frames since the last decision.
     fn catch_up(&mut self) {
         let epoch = std::mem::take(&mut self.epoch);
         if let Some(choice) = self.choice.filter(|_| epoch.frames > 0) {
@@ -204,7 +204,7 @@ impl Runner {
         self.policy.decision_ns = self.tracker.pace.decision_ns;
     }
 
-    /// Chooses among those that are here; if none is, among those that are awaited.
+    /// Chooses among the instances that are here. If none is, waits for those that are being prepared.
     fn choose_among(&mut self, choose: impl Fn(&mut Policy, &crate::load::Load) -> Option<Choice>) -> Option<Choice> {
         let load = self.tracker.load;
         let choice = choose(&mut self.policy, &load);
@@ -214,14 +214,14 @@ impl Runner {
         choose(&mut self.policy, &load)
     }
 
-    /// Gets an instance ready. If that takes a thread of its own, it is not chosen meanwhile.
+    /// Prepares an instance. If that takes a thread of its own, the instance is not chosen meanwhile.
     fn warm(&mut self, instance: usize, objects: usize) {
         self.instances[instance].warm(objects);
         self.any_away |= self.instances[instance].place.is_away();
         self.update(instance);
     }
 
-    /// Takes back what has got ready, or with `patience` all that is getting ready. Returns whether anything came.
+    /// Takes back the instances that are ready; with `patience` waits for all others. Returns whether any came back.
     fn take_back(&mut self, patience: bool) -> bool {
         let mut any = false;
         if self.any_away {
@@ -236,12 +236,12 @@ impl Runner {
         any
     }
 
-    /// An instance can be chosen while it is here.
+    /// Lets the policy choose an instance only if it is here.
     fn update(&mut self, instance: usize) {
         self.policy.set_usable(instance, self.instances[instance].place.is_here());
     }
 
-    /// Runs a frame that needs no decision.
+    /// Runs a frame with the algorithm of the previous one.
     fn go_on(&mut self, running: usize, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
         let started = self.epoch.is_timed().then(Instant::now);
         match self.instances[running].go_on(boxes, pairs) {
@@ -263,7 +263,7 @@ impl Runner {
         }
     }
 
-    /// Takes in a frame without a decision that took so long that the next one needs one.
+    /// Records a frame without a decision that stood out, and makes a decision due.
     #[inline(never)]
     fn stood_out(&mut self, ns: f64, boxes: &[Aabb], pairs: &Pairs) {
         let Some(choice) = self.choice else { return };
@@ -272,12 +272,12 @@ impl Runner {
         self.tracker.pace.wake();
     }
 
-    /// Runs what was chosen, and if that fails the next cheapest in this same frame.
+    /// Runs the choice. If that fails, runs the next cheapest in the same frame.
     #[inline(never)]
     fn run_chosen(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
         loop {
             let Some(choice) = self.choice else {
-                // What the last one left is no answer.
+                // Drops the pairs of the algorithm that failed last.
                 pairs.clear();
                 let algorithm = self.instances[0].id.clone();
                 return Err(Error::Unavailable { algorithm, reason: Unavailable::AllFailed });
@@ -300,7 +300,7 @@ impl Runner {
         }
     }
 
-    /// Takes in a frame that was decided or belongs to a trial.
+    /// Records a frame that was decided or belongs to a trial.
     fn ran(&mut self, choice: Choice, ns: Option<f64>, boxes: &[Aabb], pairs: &Pairs) {
         self.tracker.ran(boxes, pairs.len() as u64);
         if self.epoch.frames == 0 {
@@ -313,7 +313,7 @@ impl Runner {
             self.tell();
         }
         self.tracker.pace.set_rest(choice.predicted_ns.or(ns).unwrap_or(1.0), self.policy.rest());
-        // A first frame, and one that replaced another, were chosen by little knowledge.
+        // Little was known when a first frame or a replacement was chosen.
         if matches!(choice.reason, Reason::First | Reason::FellBack) {
             self.tracker.pace.wake();
         }
@@ -333,7 +333,7 @@ impl Runner {
         }
     }
 
-    /// Takes in that the frame failed. If the algorithm is at fault, and not the boxes, chooses another one.
+    /// Records a failed frame. If the algorithm caused the error, and not the boxes, chooses another one.
     #[cold]
     fn failed(&mut self, error: Error) -> Result<(), Error> {
         (self.steady, self.measured_ns) = (false, None);
@@ -350,15 +350,15 @@ impl Runner {
         Ok(())
     }
 
-    /// Gets the runner-up ready if its turn may come soon.
+    /// Prepares the runner-up if it may be chosen soon.
     fn warm_runner_up(&mut self, boxes: usize) {
         let Some(Choice { predicted_ns: Some(best), runner_up: Some((next, ns)), reason, .. }) = self.choice else {
             return;
         };
-        // The runner-up of a trial is the incumbent, which must be here when that ends.
+        // The runner-up of a trial is the incumbent, which must be here when the trial ends.
         let tried = reason == Reason::Explored;
         if !tried && ns <= best * WARM_WITHIN && self.instances[next].ready < boxes {
-            // By powers of two, so that a growing scene pays for this a few times in all.
+            // For powers of two, so that a growing scene prepares only a few times.
             self.warm(next, boxes.checked_next_power_of_two().unwrap_or(boxes));
         }
     }

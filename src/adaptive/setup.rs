@@ -1,4 +1,4 @@
-//! How an [`Adaptive`](super::Adaptive) came to its tuning, and where `save` writes what it learned.
+//! The origin of the tuning of an [`Adaptive`](super::Adaptive), and the cache to which `save` writes.
 
 use super::instances::Instances;
 use super::warming::end;
@@ -9,29 +9,29 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
-/// How an [`Adaptive`](crate::Adaptive) came to its tuning.
+/// The origin of the tuning of an [`Adaptive`](crate::Adaptive).
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub struct Setup {
-    /// Where the tuning came from.
+    /// Source of the tuning.
     pub origin: Origin,
-    /// What went wrong, one sentence each: an unreadable cache, a GPU that can't be measured. Frames run all the same.
+    /// Problems, one sentence each: an unreadable cache, a GPU that can't be measured. Frames run all the same.
     pub remarks: Vec<String>,
     /// Seconds from the call of the constructor until the algorithms of the tuning were ready.
     pub seconds: f64,
-    /// The cache file of the tuning, whether it could be written or not; `None` if it is not kept.
+    /// The cache file of the tuning, also if it could not be written; `None` without a cache.
     pub file: Option<PathBuf>,
 }
 
-/// Where the tuning of an [`Adaptive`](crate::Adaptive) came from.
+/// The source of the tuning of an [`Adaptive`](crate::Adaptive).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Origin {
     /// From the program: [`Adaptive::new`](crate::Adaptive::new).
     #[default]
     Given,
-    /// A background thread still reads or measures; [`Tuning::usual`](crate::Tuning::usual) decides meanwhile. Every
-    /// frame checks whether it is done.
+    /// A background thread still reads or measures. [`Tuning::usual`](crate::Tuning::usual) decides meanwhile, and
+    /// every frame checks whether the thread has ended.
     Awaited,
     /// From the cache.
     Cached,
@@ -51,7 +51,7 @@ pub enum SaveError {
     Write {
         /// The file.
         file: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         source: std::io::Error,
     },
 }
@@ -77,15 +77,15 @@ impl std::error::Error for SaveError {
     }
 }
 
-/// Writes a tuning to the cache. `false`: it must not be kept.
+/// Writes a tuning to the cache. Returns `false` if the tuning must not be kept.
 pub(super) type Save = Arc<dyn Fn(&Tuning) -> Result<bool, SaveError> + Send + Sync>;
 
-/// What an [`Adaptive`](super::Adaptive) keeps of its start.
+/// The state of an [`Adaptive`](super::Adaptive) that depends on its start.
 #[derive(Default)]
 pub struct Start {
-    /// How the tuning came about.
+    /// The origin of the tuning.
     pub setup: Setup,
-    /// Saves what was learned; `None` without a cache.
+    /// Saves a learned tuning; `None` without a cache.
     pub save: Option<Save>,
     /// The thread that still measures.
     pub background: Option<Background>,
@@ -105,7 +105,8 @@ impl Start {
         Self { setup, save, background: None }
     }
 
-    /// Saves what was learned. `false` when the tuning has not arrived, could not be predicted, or must not be kept.
+    /// Saves the learned tuning. Returns `false` if the tuning has not arrived, could not be predicted, or must not be
+    /// kept.
     pub(super) fn save(&self, learned: impl FnOnce() -> Tuning) -> Result<bool, SaveError> {
         match (&self.save, self.setup.origin) {
             (Some(save), _) => save(&learned()),
@@ -114,7 +115,7 @@ impl Start {
         }
     }
 
-    /// Takes the result of the background thread once it is done. Costs one load of a flag until then.
+    /// Takes the result of the background thread if the thread has ended. Until then a call loads one flag.
     pub(super) fn arrived(&mut self) -> Option<(Tuning, Instances)> {
         let thread = self.background.as_mut()?.thread.take_if(|thread| thread.is_finished())?;
         self.background = None;
@@ -128,16 +129,16 @@ impl Start {
     }
 }
 
-/// The thread that measures while frames run. It is told to stop when the [`Adaptive`](super::Adaptive) is dropped.
+/// The thread that measures while frames run. Dropping the [`Adaptive`](super::Adaptive) stops it.
 pub struct Background {
-    /// The thread; `None` once it was joined.
+    /// The thread; `None` after it was joined.
     pub thread: Option<JoinHandle<Arrival>>,
-    /// Set when it is to stop.
+    /// Whether the thread should stop.
     pub stop: Arc<AtomicBool>,
 }
 
 impl Drop for Background {
-    // It looks at the flag after each sample, of which the longest take tenths of a second.
+    // The thread reads the flag after each sample. The longest samples take tenths of a second.
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         end(self.thread.take());

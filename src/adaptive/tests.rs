@@ -45,7 +45,7 @@ pub(crate) fn tuning_of_steps(steps: &[(u32, &str)]) -> Tuning {
     Tuning::from_steps(steps.iter().map(|&(from, id)| Step::new(from, id.parse().unwrap())).collect()).unwrap()
 }
 
-/// The revision that this build has of a method of the CPU; 1 of any other.
+/// Returns the revision of a built-in method on the CPU; 1 for any other.
 fn revision(id: &str) -> u32 {
     let registry = Registry::with_cores(1);
     registry.entries().iter().find(|e| id.starts_with(&format!("{}@cpu", e.id.method()))).map_or(1, |e| e.revision)
@@ -106,8 +106,8 @@ fn steps_whose_algorithm_has_no_cost_are_passed_over() {
     }
 }
 
-/// Finds no pair, and does this in each frame and to get ready.
-struct MadeUp<F, P>(F, P);
+/// An algorithm that finds no pair. It calls the first function in each frame, the second to get ready.
+pub(crate) struct MadeUp<F, P>(pub(crate) F, pub(crate) P);
 
 impl<F: FnMut() -> Result<(), Error> + Send + Sync, P: Fn() + Send + Sync> BroadPhase for MadeUp<F, P> {
     fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
@@ -121,7 +121,7 @@ impl<F: FnMut() -> Result<(), Error> + Send + Sync, P: Fn() + Send + Sync> Broad
     }
 }
 
-/// Works for some frames, then is lost as a GPU can be.
+/// Makes an algorithm that runs for some frames, then fails like a lost GPU.
 fn fragile(mut frames: u32) -> Result<Box<dyn BroadPhase>, Error> {
     let lost = || Error::Unavailable { algorithm: "fragile@gpu0".parse().unwrap(), reason: "lost".into() };
     let frame = move || {
@@ -131,7 +131,7 @@ fn fragile(mut frames: u32) -> Result<Box<dyn BroadPhase>, Error> {
     Ok(Box::new(MadeUp(frame, || {})))
 }
 
-/// A frame that takes this many nanoseconds of the counted clock.
+/// Returns a frame that takes `ns` nanoseconds of the counted clock.
 fn spends(ns: f64) -> impl FnMut() -> Result<(), Error> {
     move || {
         clock::counted::spend(ns);
@@ -154,7 +154,7 @@ fn a_lost_algorithm_is_replaced_within_the_frame() {
     assert_eq!(chosen(&mut adaptive, 30), ("brute@cpu1".to_owned(), Reason::Stayed));
 }
 
-/// Adds up the frames that it was told to have missed.
+/// Adds up the missed frames that were reported to it.
 struct Told(Arc<AtomicU64>);
 
 impl BroadPhase for Told {
@@ -201,7 +201,7 @@ fn one_that_keeps_work_is_told_how_many_frames_it_missed() {
         (0..50).for_each(|_| _ = chosen(&mut adaptive, objects));
     }
     assert_eq!(told.load(Ordering::Relaxed), 100);
-    // A frame that fails is told of those before it, and the next one of none.
+    // Missed frames are reported before a frame that fails, and not again before the next one.
     (0..50).for_each(|_| _ = chosen(&mut adaptive, 10));
     let mut boxes = row(1000);
     boxes[999].min[0] = f32::NAN;
@@ -222,7 +222,7 @@ fn unknown_algorithms_are_skipped_and_none_at_all_is_an_error() {
     assert!(Adaptive::new(tuning(&[("octree@cpu1", 0.0, 0.1)]), &registry).is_err());
 }
 
-/// The algorithm and the estimate of `moved` in each of this many frames of a scene.
+/// Returns the algorithm and the estimate of `moved` in each frame of a scene.
 fn course(adaptive: &mut Adaptive, scenario: Scenario, frames: usize) -> Vec<(String, f64)> {
     let mut scene = Scene::start(scenario, 2000, 1);
     let mut pairs = Pairs::new();
@@ -235,7 +235,7 @@ fn course(adaptive: &mut Adaptive, scenario: Scenario, frames: usize) -> Vec<(St
     (0..frames).map(frame).collect()
 }
 
-/// 40 n, and 15 n + 100 n moved.
+/// Returns a choice between costs of 40 n and 15 n + 100 n moved.
 fn grid_sap_or_pair_cache() -> Adaptive {
     let tuning =
         tuning_of([Term::Objects, Term::Moved], &[("grid-sap@cpu1", 40.0, 0.0), ("pair-cache@cpu1", 15.0, 100.0)]);
@@ -254,17 +254,18 @@ fn from_the_second_frame_on_it_knows_how_far_boxes_move() {
         assert_eq!(course[0].1, 1.0, "{scenario}");
         for (k, (chosen, moved)) in course.iter().enumerate().skip(1) {
             assert!((least..=most).contains(moved), "{scenario}: {moved}");
-            // A frame for what the start of `pair-cache` costs to be saved.
+            // The first frame of `pair-cache` has paid for itself by then.
             assert!(k < 3 || chosen == algorithm, "{scenario}, frame {k}: {chosen}");
         }
     }
 }
 
-/// Samples that it takes until an algorithm runs. How many frames lie between two of them depends on the clock.
+/// Returns the number of samples until an algorithm runs. The number of frames between two samples depends on the
+/// clock.
 fn samples_until(adaptive: &mut Adaptive, scene: &mut Scene, algorithm: &str) -> u32 {
     let mut pairs = Pairs::new();
     let mut samples = 0;
-    // Samples that an interrupted one put off come in the end; a choice that never comes must not run for ever.
+    // An interrupted sample delays the next ones. The limit ends the loop if the algorithm is never chosen.
     for _ in 0..1_000_000 {
         adaptive.find_pairs(scene.boxes(), &mut pairs).unwrap();
         scene.advance();
@@ -281,12 +282,12 @@ fn a_change_of_how_far_boxes_move_is_seen_within_two_samples() {
     let mut adaptive = grid_sap_or_pair_cache();
     assert_eq!(course(&mut adaptive, Scenario::Uniform, 50)[49].0, "pair-cache@cpu1");
     assert!(samples_until(&mut adaptive, &mut Scene::start(Scenario::Fast, 2000, 1), "grid-sap@cpu1") <= 2);
-    // Another number of boxes is sampled when a few times the price of that has passed, and the frame after tells.
+    // Another number of boxes is sampled soon, and the motion is known one frame later.
     assert!(samples_until(&mut adaptive, &mut Scene::start(Scenario::Resting, 500, 1), "pair-cache@cpu1") <= 2);
     assert!(adaptive.last_decision().unwrap().load.moved <= 0.01);
 }
 
-/// A row of boxes, shifted by so much along each axis.
+/// Returns a row of boxes, shifted by `by` along each axis.
 fn shifted(by: f32) -> Vec<Aabb> {
     row(500).iter().map(|b| Aabb::new(b.min.map(|x| x + by), b.max.map(|x| x + by))).collect()
 }
@@ -297,7 +298,7 @@ fn a_frame_that_stands_out_is_compared_with_the_one_before_it() {
     let mut tracker = LoadTracker::default();
     tracker.update(&at(0));
     tracker.ran(&at(0), 100);
-    // Nobody has decided on this one.
+    // A frame without a decision.
     tracker.ran(&at(1), 100);
     tracker.update(&at(2));
     let moved = tracker.motion.unwrap().moved;

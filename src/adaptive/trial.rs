@@ -1,20 +1,20 @@
-//! Trials: another algorithm than the incumbent runs for a few frames, to learn what it costs.
+//! Trials: another algorithm than the incumbent runs for a few frames, to measure its cost.
 
 use crate::stats::normal_density;
 
-/// Share of the time that trials may cost, and frames of the incumbent that they may cost in advance.
+/// The exploration budget as a share of the time, and the frames of the incumbent that trials may cost in advance.
 const BUDGET: f64 = 0.005;
 const IN_ADVANCE: f64 = 8.0;
-/// A trial that is expected to save this many times its price is made on credit.
+/// A trial whose expected saving is this many times its price runs on credit.
 const URGENT: f64 = 17.0;
-/// Frames over which the result of a trial is taken to be of use: five seconds of a game.
+/// Frames over which the result of a trial counts as useful: five seconds of a game.
 const HORIZON: f64 = 300.0;
-/// Frames of the incumbent that a trial is expected to save beyond its price, at least: candidates that cost nearly the
-/// same are left alone. Replays: 1.073 → 1.068, worst 1.31 → 1.21.
+/// Least expected saving of a trial beyond its price, in frames of the incumbent: candidates that cost nearly the same
+/// are not tried. Replays: 1.073 → 1.068, worst 1.31 → 1.21.
 const LEAST_GAIN: f64 = 5.0;
-/// Frames from the beginning of one trial to the next, at least.
+/// Fewest frames from the beginning of one trial to that of the next.
 const APART: u64 = 16;
-/// A trial ends early once it has cost its price and this many frames of the incumbent.
+/// A trial ends early when it has cost its price plus this many frames of the incumbent.
 const OVERRUN: f64 = 1.0;
 
 /// A trial, or the offer of one.
@@ -32,29 +32,29 @@ impl Trial {
     }
 }
 
-/// The trial that runs, and what trials have cost.
+/// The trial that runs, and the cost of trials.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Trials {
     pub(super) running: Option<Trial>,
     pub(super) begun_at: u64,
-    /// Nanoseconds of trials that the budget has not yet covered.
+    /// Nanoseconds of trials that the budget has not covered yet.
     debt_ns: f64,
 }
 
 impl Trials {
-    /// Pays back with the budget of frames that took this long together.
+    /// Pays back the debt with the budget that frames of `ns` in all have earned.
     pub(super) fn earn(&mut self, ns: f64) {
         self.debt_ns = (self.debt_ns - BUDGET * ns).max(0.0);
     }
 
-    /// Whether one may begin with this frame, if the incumbent's takes `now_ns`.
+    /// Returns whether a trial may begin with this frame. A frame of the incumbent takes `now_ns`.
     pub(super) fn may_begin(&self, frame: u64, now_ns: f64) -> bool {
         self.running.is_none() && frame >= self.begun_at + APART && self.debt_ns <= IN_ADVANCE * now_ns
     }
 
-    /// The trial of a candidate for some frames, and what it is expected to save beyond its price. `ratio_ln` is the
-    /// expected logarithm of its cost over the incumbent's, and `told_ln` the standard deviation by which the trial is
-    /// expected to correct that. `None` if it doesn't pay.
+    /// Returns the trial of a candidate and its expected saving beyond its price, or `None` if it does not pay.
+    /// `ratio_ln` is the expected logarithm of the candidate's cost over the incumbent's, `told_ln` the standard
+    /// deviation of its correction by the trial.
     pub(super) fn offer(
         &self,
         candidate: usize,
@@ -70,7 +70,7 @@ impl Trials {
         (gain_ns > price_ns + LEAST_GAIN * now_ns && affordable).then_some((trial, gain_ns - price_ns))
     }
 
-    /// Takes in a frame of the trial that cost this much more than the incumbent's would have.
+    /// Records a frame of the trial that cost `extra_ns` more than one of the incumbent.
     pub(super) fn ran(&mut self, extra_ns: f64) {
         if let Some(trial) = &mut self.running {
             trial.left = trial.left.saturating_sub(1);
@@ -80,8 +80,8 @@ impl Trials {
     }
 }
 
-/// Expected saving, as a share of the incumbent's cost, of learning another's: the mean of what lies below zero of a
-/// normal distribution with this mean and deviation, less what a switch without the trial would save.
+/// Returns the expected saving from knowing a candidate's cost, as a share of the incumbent's cost: the mean of the
+/// part below zero of a normal distribution with this mean and deviation, less the saving of a switch without a trial.
 fn expected_gain(ratio_ln: f64, told_ln: f64) -> f64 {
     if told_ln.is_nan() || told_ln <= 0.0 {
         return 0.0;

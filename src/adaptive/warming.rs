@@ -1,4 +1,4 @@
-//! An algorithm that gets ready, on a thread of its own where that may wait for a driver.
+//! The preparation of an algorithm, on a thread of its own if it may wait for a driver.
 
 use crate::broad_phase::BroadPhase;
 use crate::clock::Instant;
@@ -6,16 +6,16 @@ use std::sync::mpsc;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// How long a drop waits for a thread. A driver may hold it longer, up to the limit of its GPU: the thread then ends by
-/// itself, and what it holds with it.
+/// Longest wait of a drop for a thread. A driver may hold the thread longer, up to the limit of its GPU; then the
+/// thread ends by itself and drops the algorithm.
 const LAST_WAIT: Duration = Duration::from_secs(2);
 
-/// Where an algorithm is.
+/// The place of an algorithm.
 pub(super) enum Place {
     Here(Box<dyn BroadPhase>),
-    /// On the thread that gets it ready and returns it.
+    /// On the thread that prepares it and returns it.
     Away(Preparing),
-    /// It could not be made, failed, or panicked while it got ready.
+    /// It could not be made, it failed, or its preparation panicked.
     Gone,
 }
 
@@ -23,7 +23,7 @@ pub(super) enum Place {
 pub(super) struct Preparing(Option<JoinHandle<Option<Box<dyn BroadPhase>>>>);
 
 impl Place {
-    /// The algorithm, unless it is away or gone.
+    /// Returns the algorithm, `None` if it is away or gone.
     pub(super) fn here(&mut self) -> Option<&mut Box<dyn BroadPhase>> {
         match self {
             Self::Here(algorithm) => Some(algorithm),
@@ -31,8 +31,8 @@ impl Place {
         }
     }
 
-    /// Sends the algorithm away to get ready for that many objects. Where there are no threads it stays as it is, and
-    /// its first frame pays.
+    /// Prepares the algorithm for `objects` objects on another thread. If no thread can be started, the algorithm
+    /// stays unprepared, and its first frame takes longer.
     pub(super) fn send(&mut self, objects: usize) {
         let (hand_over, taken) = mpsc::channel::<Box<dyn BroadPhase>>();
         let run = move || {
@@ -42,7 +42,7 @@ impl Place {
         };
         *self = match std::mem::replace(self, Self::Gone) {
             Self::Here(algorithm) => match std::thread::Builder::new().name("sapwise-warm".to_owned()).spawn(run) {
-                // Handed over only now: a closure that can't be started is dropped with all that it holds.
+                // Handed over only now: if the thread can't be started, the closure is dropped with its content.
                 Ok(thread) => match hand_over.send(algorithm) {
                     Ok(()) => Self::Away(Preparing(Some(thread))),
                     Err(mpsc::SendError(algorithm)) => Self::Here(algorithm),
@@ -53,8 +53,8 @@ impl Place {
         };
     }
 
-    /// Takes the algorithm back from its thread if it is ready; with `patience` waits until it is. Returns whether it was
-    /// away and is no longer.
+    /// Takes the algorithm back from its thread if it is ready; waits until it is with `patience`. Returns whether the
+    /// thread has ended.
     pub(super) fn take_back(&mut self, patience: bool) -> bool {
         let Self::Away(Preparing(thread)) = self else { return false };
         let Some(thread) = thread.take_if(|thread| patience || thread.is_finished()) else { return false };
@@ -77,7 +77,7 @@ impl Drop for Preparing {
     }
 }
 
-/// Waits for a thread whose result nobody wants any more.
+/// Waits up to [`LAST_WAIT`] for a thread whose result is not needed any more.
 pub(super) fn end<T>(thread: Option<JoinHandle<T>>) {
     let Some(thread) = thread else { return };
     let began = Instant::now();
@@ -87,6 +87,6 @@ pub(super) fn end<T>(thread: Option<JoinHandle<T>>) {
         }
         std::thread::sleep(Duration::from_millis(1));
     }
-    // A panic of it was reported when it happened.
+    // A panic was reported when it happened.
     let _ = thread.join();
 }

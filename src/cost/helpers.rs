@@ -34,7 +34,7 @@ impl Helpers {
         share * self.call_ns + work_ns.min((work_ns + self.late_ns) / speed_up)
     }
 
-    /// Share of the helpers that a frame of `objects` boxes calls; `None` if it calls none.
+    /// Returns the share of the helpers that a frame of `objects` boxes calls; `None` if it calls none.
     fn share(&self, objects: u32) -> Option<f64> {
         if self.boxes_per_thread == 0 || self.threads < 2 {
             return (self.threads > 1).then_some(1.0);
@@ -43,7 +43,7 @@ impl Helpers {
         (called > 0).then(|| f64::from(called) / f64::from(self.threads - 1))
     }
 
-    /// Whether its values are possible.
+    /// Returns whether its values are possible.
     pub(super) fn is_sound(&self) -> bool {
         let times = [self.call_ns, self.late_ns];
         self.threads > 1

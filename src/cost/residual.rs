@@ -158,7 +158,7 @@ impl Residual {
         self.constant + sums.iter().sum::<f64>() + rest
     }
 
-    /// Whether its weights are finite and no more than there are places.
+    /// Returns whether its weights are plausible, and no more than its places.
     pub(crate) fn is_sound(&self) -> bool {
         self.weights.len() <= self.places.loads.len()
             && self.weights.iter().chain([&self.constant]).all(|w| w.abs() <= MOST_LN)
@@ -166,7 +166,7 @@ impl Residual {
     }
 }
 
-/// Base-2 logarithms of the fewest and of the most objects of some loads.
+/// Returns the base-2 logarithms of the fewest and of the most objects of some loads.
 fn sizes(loads: &[Load]) -> [f64; 2] {
     let all = loads.iter().map(octaves);
     [all.clone().fold(64.0, f64::min), all.fold(0.0, f64::max)]

@@ -35,7 +35,8 @@ pub enum Term {
 /// A product of powers of a load's values, for algorithms that the other terms do not describe. A tree has two:
 /// `Product { objects: 1, log2_objects: 1, ..Product::ONE }`, and the same with `pairs` in place of `objects`.
 ///
-/// No power is negative, so that no count falls when a value rises. Together they are at most [`Product::MOST_POWERS`].
+/// No power is negative, so that no count falls when a value rises. Together they are at most
+/// [`Product::MOST_POWERS`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
@@ -68,7 +69,7 @@ impl Product {
     /// Most powers of a product together: more of 2^64 candidates each would overflow to infinity.
     pub const MOST_POWERS: u32 = 8;
 
-    /// Whether its powers together are at most [`Self::MOST_POWERS`].
+    /// Returns whether its powers together are at most [`Self::MOST_POWERS`].
     pub(super) fn is_sound(&self) -> bool {
         self.powers().into_iter().map(u32::from).sum::<u32>() <= Self::MOST_POWERS
     }
@@ -86,7 +87,7 @@ impl Product {
     }
 }
 
-/// Whether a file leaves this power out.
+/// Returns whether a file leaves this power out.
 #[cfg(feature = "serde")]
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
 fn is_zero(power: &u8) -> bool {

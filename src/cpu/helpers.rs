@@ -117,7 +117,7 @@ impl Team {
         Self { pool, shared: Arc::new(Shared { phases: Phases::default(), placement }), may_call }
     }
 
-    /// Notes where the caller runs, for helpers that come now and for those whose invitation is not taken yet.
+    /// Records the CPU of the caller, for helpers that come now and for those whose invitation is not taken yet.
     fn follow_caller(&self) {
         if let Some(placement) = &self.shared.placement {
             placement.follow_caller();

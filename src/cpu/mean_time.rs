@@ -16,7 +16,7 @@ impl MeanTime {
     }
 }
 
-/// Returns whether neither number of boxes is more than twice the other, so that the time of one tells of the other.
+/// Returns whether neither number of boxes is more than twice the other: then times for each box are comparable.
 pub(crate) fn is_as_many(a: usize, b: usize) -> bool {
     a <= 2 * b.max(1) && b <= 2 * a.max(1)
 }

@@ -53,7 +53,7 @@ pub(crate) struct Method {
     pub(crate) revision: u32,
     /// Makes an instance for this many threads at a SIMD level.
     pub(crate) create: fn(u32, &Threads, Simd) -> Made,
-    /// Whether it uses as many of its threads as make a frame fast.
+    /// Whether it fits the number of its threads to each frame.
     pub(crate) fits_threads: bool,
 }
 

@@ -1,5 +1,5 @@
-//! Pins threads, for callers who ask for that: one to each physical core before any has two, and to other cores in each
-//! process.
+//! Pins threads, for callers who ask for that: one to each physical core before any has two, and to other cores in
+//! each process.
 
 use crate::mix;
 use core_affinity::CoreId;
@@ -71,7 +71,7 @@ impl CpuPlacement {
         POSITION.set(position);
     }
 
-    /// Notes where the caller runs.
+    /// Records the CPU of the caller.
     pub(crate) fn follow_caller(&self) {
         self.caller.store(current_cpu(), Relaxed);
     }
@@ -123,7 +123,7 @@ fn usable() -> Vec<Cpu> {
 
 /// Returns a number that differs from process to process.
 fn number_of_process() -> u64 {
-    // The first process of every container has the number 1: the number of its namespace tells containers apart.
+    // The first process of every container has the number 1. Containers differ in the number of their namespace.
     let namespace = std::fs::read_link("/proc/self/ns/pid").unwrap_or_default();
     u64::from(std::process::id()) + first_number(&namespace.to_string_lossy()).unwrap_or(0)
 }
@@ -133,7 +133,7 @@ fn first_number(text: &str) -> Option<u64> {
     digits.split(|c: char| !c.is_ascii_digit()).next()?.parse().ok()
 }
 
-/// Returns the CPU on which this thread runs now, or a number that no CPU has if the system does not tell.
+/// Returns the CPU on which this thread runs now, or a number that no CPU has if the system does not report it.
 fn current_cpu() -> usize {
     #[cfg(target_os = "linux")]
     return rustix::thread::sched_getcpu();

@@ -83,14 +83,15 @@ impl Workers {
         self.tasks
     }
 
-    /// Returns as many of these threads as a frame of `boxes` boxes keeps busy, with as many tasks. A method that takes
-    /// more or less time for a box than `grid-sap` passes the number of boxes for which `grid-sap` takes as long.
+    /// Returns the part of these threads that a frame of `boxes` boxes keeps busy, with the tasks for them. A method
+    /// that takes more or less time for a box than `grid-sap` passes the number of boxes for which `grid-sap` takes as
+    /// long.
     pub fn fit(&self, boxes: usize) -> Self {
         let fit = self.at_most((boxes / BOXES_PER_THREAD).max(1));
         Self { tasks: fit.tasks.min((boxes / SMALLEST_TASK).max(1)), ..fit }
     }
 
-    /// Returns at most this many of these threads, with as many tasks.
+    /// Returns at most `threads` of these threads, with the tasks for them.
     pub fn at_most(&self, threads: usize) -> Self {
         let threads = self.threads.min(threads);
         Self {
@@ -132,7 +133,8 @@ impl Workers {
 
     /// Runs one phase: hands out the tasks one by one to the caller and its helpers. Returns when all are done.
     ///
-    /// The caller works instead of sleeping: waking a thread takes tens of microseconds, which a frame would pay twice.
+    /// The caller works instead of sleeping: waking a thread takes tens of microseconds, which a frame would pay
+    /// twice.
     pub fn each_of<I: Iterator<Item: Send> + Send>(&self, tasks: I, work: impl Fn(I::Item) + Sync) {
         #[cfg(feature = "parallel")]
         // A single task needs no help.

@@ -38,12 +38,12 @@ pub enum GpuErrorKind {
 }
 
 impl GpuError {
-    /// An error without a source.
+    /// Makes an error without a source.
     pub fn new(kind: GpuErrorKind, text: impl Into<String>) -> Self {
         Self { kind, text: text.into(), source: None }
     }
 
-    /// An error with what the driver or the device said.
+    /// Makes an error with that of the driver or the device as its source.
     pub fn caused(
         kind: GpuErrorKind,
         text: impl Into<String>,
@@ -52,7 +52,7 @@ impl GpuError {
         Self { kind, text: text.into(), source: Some(Arc::new(source)) }
     }
 
-    /// The same with another text, unless the GPU is gone: then it does not matter what it was to do.
+    /// Replaces the text, unless the GPU is gone: then the failed operation does not matter.
     pub fn of(self, text: impl Into<String>) -> Self {
         match self.kind {
             GpuErrorKind::Lost | GpuErrorKind::Inert => self,
@@ -60,7 +60,7 @@ impl GpuError {
         }
     }
 
-    /// The kind of error.
+    /// Returns the kind of error.
     pub fn kind(&self) -> GpuErrorKind {
         self.kind
     }

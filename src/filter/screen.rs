@@ -2,13 +2,14 @@
 
 use super::{Filter, Membership};
 
-/// Most different memberships, owners aside, that are told apart.
+/// Most different memberships, owners aside, that are classified.
 const MOST_CLASSES: usize = 32;
 
 /// Slots of the table of classes.
 const SLOTS: usize = 2 * MOST_CLASSES;
 
-/// A filter and its passive boxes: a set of boxes no two of which are wanted as a pair. No method compares two of them.
+/// A filter and its passive boxes: a set of boxes no two of which are wanted as a pair. No method compares two of
+/// them.
 #[derive(Debug, Clone)]
 pub(crate) struct Screen {
     pub(crate) filter: Filter,

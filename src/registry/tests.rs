@@ -1,5 +1,5 @@
 use super::*;
-use crate::adaptive::tests::tuning_of_steps;
+use crate::adaptive::tests::{MadeUp, tuning_of_steps};
 use crate::{Aabb, Pairs};
 
 #[test]
@@ -10,22 +10,14 @@ fn thread_counts_double_up_to_all() {
     assert_eq!(thread_counts(0).collect::<Vec<_>>(), [1]);
 }
 
-struct Nothing;
-
-impl BroadPhase for Nothing {
-    fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
-        pairs.clear();
-        pairs.finish()
-    }
-}
-
 #[test]
 fn user_adds_and_replaces_algorithms() {
     let mut registry = Registry::with_cores(1);
     let ours = registry.entries().len();
     let id: AlgorithmId = "my-tree@cpu1".parse().unwrap();
-    registry.add(id.clone(), 7, || Ok(Box::new(Nothing)));
-    registry.add(id.clone(), 8, || Ok(Box::new(Nothing)));
+    for revision in [7, 8] {
+        registry.add(id.clone(), revision, || Ok(Box::new(MadeUp(|| Ok(()), || {}))));
+    }
     assert_eq!(registry.entries().len(), ours + 1);
     assert_eq!(registry.entries()[ours].revision, 8);
     assert!(registry.create(&id).is_ok());

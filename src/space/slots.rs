@@ -5,7 +5,7 @@ use super::handle::Handle;
 use crate::cpu::reserve;
 use crate::{Aabb, Error, check_count};
 
-/// Where a body is.
+/// The place of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum At {
     /// There is no body in this slot.

@@ -47,7 +47,8 @@ impl Space {
             self.sorter.sort(&Workers::one(), &mut self.before);
         }
         if let Err(error) = self.find().and_then(|()| self.compare()) {
-            // Their lists missed who came to rest, and nobody rests before the pairs of where it is now are known.
+            // Neighbours that came to rest are missing from the lists. Bodies stay active until the pairs of their
+            // present boxes are known.
             self.neighbours.clear();
             self.active.stay_until(self.update + 2);
             return Err(error);

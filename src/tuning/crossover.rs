@@ -22,7 +22,7 @@ pub struct Crossover {
 }
 
 impl Crossover {
-    /// Both ends of the interval, if there is one.
+    /// Returns both ends of the interval, if there is one.
     pub fn interval(&self) -> Option<(f64, f64)> {
         self.low.zip(self.high)
     }

@@ -84,7 +84,7 @@ struct CostFile {
     spread_ln: f64,
 }
 
-/// The works of a tuning, each once, and a fallback before the work that has it.
+/// The works of a tuning, each once. A fallback stands before the work that has it.
 #[derive(Default)]
 struct Works {
     known: Vec<Arc<Work>>,
@@ -92,7 +92,7 @@ struct Works {
 }
 
 impl Works {
-    /// The position of a work, which is added if it is new.
+    /// Returns the position of a work, and adds it if it is new.
     fn position(&mut self, work: &Arc<Work>) -> usize {
         if let Some(known) = self.known.iter().position(|w| Arc::ptr_eq(w, work)) {
             return known;

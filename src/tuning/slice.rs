@@ -8,15 +8,15 @@ use crate::stats::NORMAL_90;
 /// Distance between two loads that are compared, as a logarithm of objects. A narrower field may be missed.
 const FINEST_LN: f64 = 0.03;
 
-/// An algorithm within this factor of the cheapest keeps its field. The larger one is for numbers of threads of one
-/// method: one thread and two that have nothing to divide run the same code, and chance decides which is cheaper.
+/// An algorithm within this factor of the cheapest keeps its field. The larger factor applies if both have the same
+/// method: in small frames all its numbers of threads run the same code, and chance decides which is cheaper.
 const SAME: f64 = 1.02;
 const SAME_METHOD: f64 = 1.05;
 
 /// Halvings of a stretch of [`FINEST_LN`]: they find a crossover to a ten-thousandth.
 const HALVINGS: u32 = 8;
 
-/// Loads, ascending by objects, and everything between them on logarithmic axes. A place is the number of a load and
+/// Loads that ascend by objects, interpolated in between on logarithmic axes. A place is the position of a load plus
 /// the share of the way to the next.
 pub(super) struct Slice<'a>(pub(super) &'a [Load]);
 
@@ -34,7 +34,7 @@ impl Slice<'_> {
         }
     }
 
-    /// The place of a number of objects, or the nearer end.
+    /// Returns the place of a number of objects, or the nearer end.
     fn place(&self, objects: f64) -> f64 {
         let above = self.0.partition_point(|l| f64::from(l.objects) <= objects);
         let (Some(below), Some(b)) = (above.checked_sub(1), self.0.get(above)) else {
@@ -44,9 +44,9 @@ impl Slice<'_> {
         below as f64 + (x - a) / (b - a)
     }
 
-    /// The number of objects at which a condition begins to hold, upwards or downwards from `objects`; the end of the
-    /// slice if it never does. Steps that double find a load at which it holds and may step over a short stretch;
-    /// halving the last step finds where it begins.
+    /// Returns the number of objects at which a condition begins to hold, upwards or downwards from `objects`; the end
+    /// of the slice if it never does. Doubling steps find a load at which it holds, and may miss a short stretch.
+    /// Halving the last step finds the begin.
     fn reach(&self, objects: f64, upwards: bool, holds: impl Fn(&Load) -> bool) -> f64 {
         let (start, end) = (self.place(objects), if upwards { self.last() } else { 0.0 });
         let (mut not_yet, mut at, mut step) = (start, start, 0.05);
@@ -66,13 +66,13 @@ impl Slice<'_> {
         f64::from(self.load(at).objects)
     }
 
-    /// The loads from which another algorithm is the cheapest, with its position in `costs`. The first is the begin
-    /// of the slice. An algorithm keeps its field while it is within [`SAME`] of the cheapest.
+    /// Returns the loads from which another algorithm is the cheapest, with its position in `costs`. The first load is
+    /// the begin of the slice. An algorithm keeps its field while it is within [`SAME`] of the cheapest.
     pub(super) fn steps(&self, costs: &[AlgorithmCost]) -> Vec<(Load, usize)> {
         let mut steps = Vec::new();
         let Some(first) = self.0.first() else { return steps };
         let Some((cheapest_here, least)) = cheapest(costs, first, |_| true) else { return steps };
-        // Of those that cost about the same the first, which has the fewest threads.
+        // The first of those that cost about the same: it has the fewest threads.
         let holds = |best: usize, other: usize, load: &Load, least: f64| {
             let same_method = costs[best].algorithm.method() == costs[other].algorithm.method();
             costs[best].curve.cost_ns(load) <= if same_method { SAME_METHOD } else { SAME } * least
@@ -90,7 +90,7 @@ impl Slice<'_> {
                 let load = self.load(place);
                 let Some((other, least)) = cheapest(costs, &load, |_| true) else { return steps };
                 if !holds(best, other, &load, least) {
-                    // Back to the last place at which the other one was not cheaper.
+                    // Goes back to the last place at which the other algorithm was not cheaper.
                     let not_cheaper = |load: &Load| costs[other].curve.cost_ns(load) >= costs[best].curve.cost_ns(load);
                     let from = held.iter().rposition(|(_, load)| not_cheaper(load)).unwrap_or(0);
                     let to = held.get(from + 1).copied().unwrap_or((place, load));
@@ -104,7 +104,7 @@ impl Slice<'_> {
         steps
     }
 
-    /// The crossover of two algorithms whose fields meet at this number of objects. `spread` returns the standard
+    /// Returns the crossover of two algorithms whose fields meet at `objects` objects. `spread` returns the standard
     /// deviation of the logarithm of the ratio of the two costs.
     pub(super) fn crossover(
         &self,
@@ -126,7 +126,7 @@ impl Slice<'_> {
         }
     }
 
-    /// The first load between two places at which `above` is cheaper than `below`.
+    /// Returns the first load between two places at which `above` is cheaper than `below`.
     fn crossing(&self, below: &AlgorithmCost, above: &AlgorithmCost, from: f64, to: (f64, Load)) -> Load {
         let (mut low, (mut high, mut load)) = (from, to);
         for _ in 0..HALVINGS {
@@ -154,7 +154,7 @@ fn note(steps: &mut Vec<(Load, usize)>, load: Load, best: usize) {
     }
 }
 
-/// Returns position and cost of the cheapest of those that are usable.
+/// Returns position and cost of the cheapest usable algorithm.
 pub(super) fn cheapest(costs: &[AlgorithmCost], load: &Load, usable: impl Fn(usize) -> bool) -> Option<(usize, f64)> {
     let frame = Frame::new(load);
     let usable = costs.iter().enumerate().filter(|&(k, _)| usable(k));
@@ -178,8 +178,8 @@ fn between(a: &Load, b: &Load, share: f64) -> Load {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tuning::tests::drawn::drawn;
-    use crate::tuning::{CostCurve, CostTerm, Term};
+    use crate::tuning::Term;
+    use crate::tuning::tests::{cost, drawn::drawn};
 
     #[test]
     fn no_field_of_three_percent_is_missed() {
@@ -213,9 +213,7 @@ mod tests {
 
     #[test]
     fn the_fewest_threads_win_a_tie_of_one_method() {
-        let cost = |id: &str, ns: f64| {
-            AlgorithmCost::new(id.parse().unwrap(), 1, CostCurve::new(vec![CostTerm::new(Term::Call, ns)]), 0.0)
-        };
+        let cost = |id: &str, ns: f64| cost(id, &[(Term::Call, ns)], 0.0);
         let loads = [10, 1000].map(Load::of_objects);
         let first = |costs: &[AlgorithmCost]| {
             let steps = Slice(&loads).steps(costs);

@@ -3,7 +3,7 @@ pub(super) mod drawn;
 use super::*;
 use crate::tuning::{CostTerm, Term};
 
-fn cost(id: &str, terms: &[(Term, f64)], spread_ln: f64) -> AlgorithmCost {
+pub(super) fn cost(id: &str, terms: &[(Term, f64)], spread_ln: f64) -> AlgorithmCost {
     let terms = terms.iter().map(|&(term, unit_ns)| CostTerm { term, unit_ns }).collect();
     AlgorithmCost { algorithm: id.parse().unwrap(), revision: 1, curve: CostCurve::new(terms), spread_ln }
 }

@@ -1,5 +1,4 @@
-//! Courses on machines that are made up: what the policy learns, when it switches and when it explores. No clock is
-//! read.
+//! Courses on made-up machines: corrections, switches and trials of the policy. No clock is read.
 
 use super::super::decision::{Choice, Reason};
 use super::super::epoch::Epoch;
@@ -10,7 +9,7 @@ use crate::{AlgorithmId, Tuning};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// What a frame of an algorithm really takes: by its position, the number of objects and the frame.
+/// Returns the true nanoseconds of a frame of an algorithm, by its position, the number of objects and the frame.
 pub(super) type Truth = dyn Fn(usize, f64, usize) -> f64;
 
 /// One frame of a course.
@@ -21,13 +20,13 @@ pub(super) struct Frame {
     predicted_ns: f64,
     /// Without noise.
     pub(super) real_ns: f64,
-    /// Of the cheapest by expectation when it explored, else of what ran.
+    /// The least expected cost of the candidate that ran and of the runner-up.
     cheapest_ns: f64,
-    /// Of the algorithm that is really the cheapest.
+    /// The least true cost of all candidates.
     best_ns: f64,
 }
 
-/// Numbers between nought and one, of which the next follows from the last.
+/// Pseudorandom numbers from 0 to 1.
 pub(super) struct Chance(pub(super) u64);
 
 impl Chance {
@@ -58,12 +57,12 @@ fn ran(policy: &mut Policy, candidate: usize, ns: f64, work: Option<FrameWork>) 
     policy.observe(candidate, &epoch, work);
 }
 
-/// Runs this many frames of this many objects on a machine with that truth, each frame noisy by a tenth.
+/// Runs these frames of `objects` objects on a machine with these true costs, with a noise of 10 %.
 pub(super) fn run(policy: &mut Policy, frames: Range<usize>, objects: u32, truth: &Truth) -> Vec<Frame> {
     run_told(policy, frames, objects, truth, &|_, _| None)
 }
 
-/// The same where an algorithm tells how its frame came about, by its position and the frame.
+/// Does the same with the work of each frame, by the position of the algorithm and the frame.
 fn run_told(
     policy: &mut Policy,
     frames: Range<usize>,
@@ -121,8 +120,8 @@ fn regret(frames: &[Frame]) -> f64 {
 
 #[test]
 fn tuning_of_another_machine_are_corrected_by_the_frames_that_run() {
-    // All are three to four times dearer here, and the one that was predicted to be the cheapest is not. The third is
-    // out of reach: to try what is expected to be 40 % dearer is not allowed.
+    // All cost three to four times their predictions, and the predicted cheapest is not the cheapest. The third is
+    // never tried, because its prediction is 40 % higher.
     let wrong = tuning(&[("grid-sap@cpu1", 0.0, 100.0), ("sap@cpu1", 0.0, 110.0), ("brute@cpu1", 0.0, 140.0)]);
     let truth = |k: usize, n: f64, _: usize| n * [390.0, 330.0, 480.0][k];
     let mut policy = policy(wrong);
@@ -187,7 +186,7 @@ fn a_clock_that_throttles_moves_every_expectation_and_no_choice() {
     assert!(frames.iter().all(|f| f.chosen == 0 || f.reason == Reason::Explored));
     let late = frames[500..].iter().filter(|f| f.chosen == 0);
     assert!(late.clone().all(|f| (f.predicted_ns / 160_000.0 - 1.0).abs() < 0.15), "{:?}", frames[599]);
-    // The other has become dearer in what is expected of it too, though it never ran.
+    // The expected cost of the other has risen too, although it never ran.
     assert!(frames[590].cheapest_ns > 140_000.0);
 }
 
@@ -263,7 +262,7 @@ fn load_that_flickers_about_a_crossover_causes_no_switch() {
     }
 }
 
-/// The first is incremental, and takes half of what the other does, which is its other way.
+/// Returns a policy whose first candidate is incremental, costs half of the second and falls back to it.
 fn policy_with_incremental() -> Policy {
     let mut costs = tuning(&[("sap@cpu1", 0.0, 10.0), ("grid-sap@cpu1", 0.0, 20.0)]);
     costs.costs[0].curve = costs.costs[0].curve.clone().with_fallback(Arc::clone(&costs.costs[1].curve.work), 1.0);
@@ -272,7 +271,7 @@ fn policy_with_incremental() -> Policy {
 
 #[test]
 fn what_rebuilds_too_often_is_left_and_taken_up_again() {
-    // Up to frame 600 the first rebuilds in one frame of three, which the tuning knows nothing of.
+    // Up to frame 600 the first rebuilds in one frame of three, which the tuning does not predict.
     let mut policy = policy_with_incremental();
     let truth = |k: usize, n: f64, at: usize| {
         let rebuilds = at < 600 && at.is_multiple_of(3);
@@ -290,13 +289,13 @@ fn what_rebuilds_too_often_is_left_and_taken_up_again() {
     };
     let frames = run_told(&mut policy, 0..3000, 1000, &truth, &work);
     let kept = |range: Range<usize>| frames[range].iter().filter(|f| f.chosen == 0).count();
-    // (10 + 10 + 90) / 3 is more than 20. Now and then it is tried whether that still holds.
+    // (10 + 10 + 90) / 3 is more than 20. Rare trials check that.
     assert!(kept(0..100) > 0 && kept(200..600) < 260, "{} of 400", kept(200..600));
     assert!(kept(2500..3000) > 450, "{} of 500", kept(2500..3000));
 }
 
-/// Frames of what keeps work alone never tell whether the machine is slower than believed, or this scene spares it
-/// less.
+/// Frames of an incremental algorithm alone can't show whether the machine is slower than predicted, or the savings in
+/// this scene are smaller.
 #[test]
 fn what_keeps_work_and_spares_less_than_believed_is_left_in_the_end() {
     let mut policy = policy_with_incremental();
@@ -307,7 +306,7 @@ fn what_keeps_work_and_spares_less_than_believed_is_left_in_the_end() {
     assert!(kept(3000..10_000) < 350, "{} of 7000", kept(3000..10_000));
 }
 
-/// A second at a breakpoint, in a frame on two threads, says nothing of the frames that follow.
+/// A frame on two threads that stops at a breakpoint for a second says nothing about later frames.
 #[test]
 fn one_long_frame_bans_no_number_of_threads() {
     let truth = |k: usize, n: f64, at: usize| n * [100.0, 60.0][k] + if at == 500 { 1.0e9 } else { 0.0 };

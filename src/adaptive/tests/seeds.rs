@@ -1,5 +1,5 @@
-//! What the policy takes over the best single candidate on a thousand made-up machines: after a stall, drifting, beside
-//! another program and with the tuning of another machine. No clock is read.
+//! The time of the policy over that of the best single candidate on a thousand made-up machines: after a stall, with
+//! drifting costs, beside another program and with the tuning of another machine. No clock is read.
 
 use super::super::policy::Policy;
 use super::learning::{Chance, Truth, run};
@@ -7,7 +7,7 @@ use super::tuning;
 use crate::stats::mean;
 use std::ops::Range;
 
-/// Nanoseconds a box that the tuning predicts.
+/// Predicted nanoseconds for each box.
 const PREDICTED: [(&str, f64); 4] =
     [("pair-cache@cpu1", 100.0), ("pair-cache@cpu2", 62.0), ("brute@cpu1", 150.0), ("brute@cpu2", 95.0)];
 const SEEDS: u64 = 1000;
@@ -27,7 +27,7 @@ fn mean_regret(range: Range<usize>, own_ln: f64, disturb: impl Fn(u32, usize, u6
         let class = (CLASS_LN * chance.normal()).exp();
         let costs = PREDICTED.map(|(_, ns)| ns * class * (own_ln * chance.normal()).exp());
         let one = move |k: usize, at: usize| costs[k] * disturb(1 + k as u32 % 2, at, seed);
-        // `pair-cache` on two threads runs on one where that is faster.
+        // `pair-cache` on two threads runs on one if that is faster.
         let truth = move |k: usize, n: f64, at: usize| n * if k == 1 { one(0, at).min(one(1, at)) } else { one(k, at) };
         let truth: &Truth = &truth;
         let of = |k: usize| range.clone().map(|at| truth(k, f64::from(OBJECTS), at)).sum::<f64>();
@@ -40,7 +40,7 @@ fn mean_regret(range: Range<usize>, own_ln: f64, disturb: impl Fn(u32, usize, u6
     mean(&regrets.collect::<Vec<_>>())
 }
 
-/// A number between nought and one that seed and frame tell.
+/// Returns a number from 0 to 1 that depends on seed and frame.
 fn chance(at: usize, seed: u64) -> f64 {
     let mut chance = Chance(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ at as u64);
     chance.next();

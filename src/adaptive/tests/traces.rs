@@ -14,7 +14,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Half the number of frames whose median tells updates from rebuilds, and the multiple of it that is a rebuild.
+/// Half the number of frames around a frame whose median is compared with it, and the multiple of that median above
+/// which it is a rebuild.
 const NEAR: usize = 16;
 const REBUILT: f64 = 2.5;
 
@@ -25,7 +26,7 @@ const FROM_NOTHING: f64 = 2.0;
 /// The first frame of any other algorithm over its usual frame.
 const COLD: f64 = 1.15;
 
-/// A trace, named `SCENE-OBJECTS-SEED` and what else tells it from others.
+/// A trace with a name of the form `SCENE-OBJECTS-SEED...`.
 struct Trace {
     name: String,
     scenario: Scenario,
@@ -35,7 +36,7 @@ struct Trace {
     objects: Vec<usize>,
     pairs: Vec<f64>,
     ids: Vec<AlgorithmId>,
-    /// By algorithm, the time of each frame, and how the frame came about if the algorithm is incremental.
+    /// By algorithm, the time and the work of each frame.
     ns: Vec<Vec<f64>>,
     works: Vec<Vec<FrameWork>>,
 }
@@ -90,7 +91,7 @@ impl Trace {
         self.ids.iter().position(|i| i.to_string() == id).unwrap()
     }
 
-    /// The time of the best single algorithm, of any method, on the numbers of threads that a tuning has.
+    /// Returns the time of the best single algorithm, of any method, on the numbers of threads that a tuning has.
     fn best_single_ns(&self, tuning: &Tuning) -> f64 {
         let has = |id: &AlgorithmId| tuning.costs.iter().any(|c| c.algorithm.threads() == id.threads());
         let known = self.ids.iter().zip(&self.ns).filter(|(id, _)| has(id));
@@ -98,7 +99,7 @@ impl Trace {
     }
 }
 
-/// How each frame came about, by its time beside those around it.
+/// Returns the work of each frame, from its time and those of the frames around it.
 fn works(ns: &[f64]) -> Vec<FrameWork> {
     let work = |at: usize| {
         let around = &ns[at.saturating_sub(NEAR)..(at + NEAR).min(ns.len())];
@@ -122,7 +123,7 @@ struct Stage {
 struct Played {
     stage: Arc<Stage>,
     column: usize,
-    /// The last frame that it ran, and how that came about.
+    /// The last frame that it ran, and the work of that frame.
     last: Option<usize>,
     work: FrameWork,
 }
@@ -165,7 +166,7 @@ impl BroadPhase for Played {
     }
 }
 
-/// The time of a run of the adaptive choice, in nanoseconds.
+/// Returns the nanoseconds of a run of the adaptive choice.
 fn play(trace: &Arc<Trace>, tuning: &Tuning) -> f64 {
     let stage =
         Arc::new(Stage { trace: Arc::clone(trace), frame: AtomicUsize::new(0), before: AtomicUsize::new(usize::MAX) });
@@ -188,7 +189,7 @@ fn play(trace: &Arc<Trace>, tuning: &Tuning) -> f64 {
     })
 }
 
-/// A stored tuning with the algorithms that run by default. The played ones have revision 1.
+/// Reads a stored tuning with the algorithms that run by default. The played ones have revision 1.
 fn read_tuning(path: &Path) -> Tuning {
     let text = std::fs::read_to_string(path).unwrap();
     let mut tuning: Tuning = serde_json::from_str::<Tuning>(&text).unwrap().for_running();

@@ -1,17 +1,17 @@
-//! No frame waits for an algorithm that gets ready.
+//! No frame waits for the preparation of an algorithm.
 
 use super::*;
 use crate::clock::Instant;
 use std::sync::{Arc, Condvar, Mutex};
 use std::time::Duration;
 
-/// For what would hang for ever.
+/// Limit of waits that would last for ever after a fault.
 const LONG: Duration = Duration::from_secs(60);
 
-/// What an algorithm does that never gets ready until it is let go.
+/// Holds the preparation of an algorithm until it is opened.
 #[derive(Default)]
 struct Gate {
-    /// How often it was to get ready, and whether it may.
+    /// Number of preparations that began, and whether they may end.
     state: Mutex<(u32, bool)>,
     changed: Condvar,
 }
@@ -36,7 +36,7 @@ impl Gate {
     }
 }
 
-/// The module over `slow@gpu0` and one other.
+/// Returns a choice between `slow@gpu0` and one other.
 fn beside(other: &str, costs: [(f64, f64); 2]) -> (Adaptive, Arc<Gate>) {
     let gate = Arc::<Gate>::default();
     let mut registry = Registry::with_cores(1);
@@ -58,7 +58,7 @@ fn frames_go_on_while_the_runner_up_waits_for_its_driver_and_it_is_chosen_once_i
         assert_eq!(chosen(&mut adaptive, 90).0, "brute@cpu1");
     }
     gate.wait_until_asked();
-    // Now it would be the cheaper one, and is not there.
+    // Now it would be cheaper, and is away.
     for _ in 0..200 {
         assert_eq!(chosen(&mut adaptive, 128).0, "brute@cpu1");
     }
@@ -86,7 +86,7 @@ fn where_nothing_else_can_run_the_frame_waits_for_it() {
 #[test]
 fn what_gets_ready_ends_with_the_module() {
     let (mut adaptive, gate) = beside("brute@cpu1", [(0.0, 10.0), (0.0, 11.0)]);
-    // The number of objects tells the first one; the second is the first to have a runner-up.
+    // The first frame is decided by the number of objects; the second is the first with a runner-up.
     (0..2).for_each(|_| _ = chosen(&mut adaptive, 90));
     gate.wait_until_asked();
     let held = Arc::strong_count(&gate);
@@ -127,7 +127,7 @@ fn what_is_settled_on_is_here_when_a_trial_of_another_one_ends() {
     let frames: Vec<_> = clock::counted::run(|| (100..400).map(|n| chosen(&mut adaptive, n)).collect());
     gate.open();
     assert!(frames.iter().any(|(_, reason)| *reason == Reason::Explored));
-    // More boxes than it has run are no reason to get it ready for them meanwhile: it would be away.
+    // The incumbent is not prepared for more boxes during a trial: it would be away when the trial ends.
     assert_eq!(gate.state.lock().unwrap().0, 0);
     assert!(frames.iter().all(|(_, reason)| *reason != Reason::FellBack));
 }

@@ -20,8 +20,8 @@ const OVERSIZED_BITS: u32 = 24;
 const STEPS: usize = 3;
 const CLASSES: usize = 64;
 
-/// The first class of each shape. The bits of a shape are the axes on which boxes are oversized, so a shape with k bits
-/// has 3^k classes.
+/// The first class of each shape. The bits of a shape are the axes on which boxes are oversized, so a shape with k
+/// bits has 3^k classes.
 const SHAPES: [u32; 8] = [0, 1, 4, 7, 16, 19, 28, 37];
 const LEAST_STEP: f32 = 4.0;
 
@@ -36,11 +36,11 @@ const MOST: f32 = 1.0e38;
 
 /// A curve through the cells of a range in space.
 ///
-/// A leaf that holds neighbours on the curve has the shape of a few cells, and it meets the fewest boxes if that is the
-/// shape of its boxes (minimise the product over the axes of leaf plus box, at a fixed volume of the leaf). So cells
-/// are flat if boxes are. A box longer than a leaf should be would widen the leaf, so each shape of oversized boxes has
-/// a curve of its own, with few cells on the axes on which they are long. Extended Morton codes (Vinkler, Bittner and
-/// Havran, HPG 2017) interleave sizes and positions to the same end.
+/// A leaf that holds neighbours on the curve has the shape of a few cells, and it meets the fewest boxes if that is
+/// the shape of its boxes (minimise the product over the axes of leaf plus box, at a fixed volume of the leaf). So
+/// cells are flat if boxes are. A box longer than a leaf should be would widen the leaf, so each shape of oversized
+/// boxes has a curve of its own, with few cells on the axes on which they are long. Extended Morton codes (Vinkler,
+/// Bittner and Havran, HPG 2017) interleave sizes and positions to the same end.
 #[derive(Debug)]
 pub(super) struct Curve {
     /// Start of the range. The fourth value is unused.
@@ -78,7 +78,7 @@ struct Class {
 impl Cells {
     /// Makes cells whose numbers have this many bits on each axis.
     fn new([x, y, z]: [f32; 3], bits: [u32; 3]) -> Self {
-        // Numbers of cells are converted from `f32` to 32 bits with a sign; finer cells would tell nothing apart.
+        // Numbers of cells are converted from `f32` to signed 32 bits; finer cells would separate no more boxes.
         let [last_x, last_y, last_z] = bits.map(|b| ((1_u32 << b.min(30)) - 1) as f32);
         Self { density: [x, y, z, 0.0], last: [last_x, last_y, last_z, 0.0] }
     }
@@ -253,7 +253,7 @@ fn bits_for(ratio: f32) -> u32 {
     (ratio.to_bits() >> 23).saturating_sub(126)
 }
 
-/// Where the boxes of a dense cell lie, and how large they are.
+/// The bounds and the sizes of the boxes of a dense cell.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Spread {
     /// The bounds of their centres.

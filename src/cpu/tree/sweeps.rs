@@ -69,7 +69,7 @@ impl Sweeps {
                 }
                 let axis = (!long).trailing_zeros() as usize;
                 let most = tree.tests(a.leaves.clone(), b.leaves.clone()).saturating_sub(copies) / MEETING;
-                // Saves copies in vain.
+                // Saves copies that would be of no use.
                 if most == 0 || likely_meeting(tree, a, b, axis) > most {
                     continue;
                 }
@@ -127,8 +127,8 @@ fn likely_meeting(tree: &Walk<'_>, a: &Kind, b: &Kind, axis: usize) -> u64 {
     met as u64 * step(a) as u64 * step(b) as u64
 }
 
-/// Returns how many leaves of `b` begin within the range of a leaf of `a` on the axis, summed over those of `a`, or any
-/// number above `most`. The leaves of both ascend by where they begin.
+/// Returns the number of leaves of `b` that begin within the range of a leaf of `a` on the axis, summed over the
+/// leaves of `a`, or any number above `most`. The leaves of both ascend by their begin.
 fn begun_within(a: &Walk<'_>, b: &Walk<'_>, axis: usize, most: u64) -> u64 {
     let begin = |leaf: usize| b.bounds_of(leaf).min[axis];
     let (count, mut first, mut begun) = (b.levels[0].len(), 0, 0_u64);

@@ -2,9 +2,9 @@
 //!
 //! Refitting is cheaper than rebuilding, but the nodes of a refitted tree widen as boxes move, and searching it gets
 //! more expensive. The excess of each search is taken to be that of the area of the leaves. The tree is rebuilt when
-//! the sum of the excesses since the last build reaches the difference between a build and a refit. If the excess grows
-//! at a constant rate, no other number of frames between two builds is cheaper; and however it grows, the cost is at
-//! most twice that of the best decisions in hindsight (the ski-rental bound).
+//! the sum of the excesses since the last build reaches the difference between a build and a refit. If the excess
+//! grows at a constant rate, no other number of frames between two builds is cheaper; and however it grows, the cost
+//! is at most twice that of the best decisions in hindsight (the ski-rental bound).
 
 use super::{Input, Members, Tree};
 use crate::clock::{Instant, elapsed_ns};
@@ -12,7 +12,7 @@ use crate::cpu::mean_time::{MeanTime, is_as_many};
 use crate::cpu::{Outputs, Workers};
 use crate::{Aabb, Error, FramePlan, Pairs};
 
-/// Frames in which no refit is tried after one that was in vain, at most.
+/// Most frames without a refit after a useless one.
 const MOST_PAUSE: u32 = 64;
 
 /// What a build costs over a refit, in searches, if that was not measured. In `uniform` and `clustered` with 1000 to
@@ -24,7 +24,7 @@ const UNMEASURED: f64 = 1.0;
 pub(crate) struct Upkeep {
     /// About the tree that the previous call left. `None`: it can't be refitted.
     tree: Option<Known>,
-    /// Frames until a refit is tried again, and their number after the next refit in vain.
+    /// Frames until a refit is tried again, and their number after the next useless refit.
     pause: u32,
     next_pause: u32,
     costs: Costs,
@@ -47,7 +47,7 @@ struct Costs {
 }
 
 impl Costs {
-    /// Begins a frame of this many boxes. Forgets the costs if they are of half or twice as many.
+    /// Begins a frame of `boxes` boxes. Forgets the costs if the known number of boxes is beyond half or twice that.
     fn begin(&mut self, boxes: usize) {
         let is_first = !is_as_many(self.boxes, boxes);
         if is_first {

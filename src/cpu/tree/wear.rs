@@ -5,7 +5,7 @@
 pub(crate) struct Wear {
     /// Nodes and queries right after the boxes were sorted.
     fresh: [u64; 2],
-    /// Nodes since then beyond what as many queries looked at in the fresh tree.
+    /// Nodes since then in excess of those that the same number of queries looked at in the fresh tree.
     pub(crate) excess: u64,
 }
 
