@@ -35,7 +35,7 @@ impl Chance {
         (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// About normal, with a deviation of one.
+    /// Returns a number of an approximately normal distribution with the standard deviation 1.
     pub(super) fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.next()).sum::<f64>() - 6.0
     }
@@ -49,7 +49,7 @@ fn policy(tuning: Tuning) -> Policy {
 /// Frames between two decisions, as in short frames.
 const APART: usize = 8;
 
-/// One decided frame.
+/// Runs one decided frame.
 fn ran(policy: &mut Policy, candidate: usize, ns: f64, work: Option<FrameWork>) {
     let mut epoch = policy.epoch(candidate);
     policy.ran(candidate, Some(ns), work, &mut epoch);
@@ -113,7 +113,12 @@ fn run_told(
     frames
 }
 
-/// Time over that of the cheapest candidate of each frame, less 1.
+/// Returns the number of frames that ran a candidate.
+fn count(frames: &[Frame], candidate: usize) -> usize {
+    frames.iter().filter(|f| f.chosen == candidate).count()
+}
+
+/// Returns the time over that of the cheapest candidate of each frame, less 1.
 fn regret(frames: &[Frame]) -> f64 {
     frames.iter().map(|f| f.real_ns).sum::<f64>() / frames.iter().map(|f| f.best_ns).sum::<f64>() - 1.0
 }
@@ -200,13 +205,10 @@ fn a_core_that_another_program_takes_is_left_and_found_again() {
     };
     let mut policy = policy(right);
     let frames = run(&mut policy, 0..6000, 1000, &truth);
-    let with_two = |range: Range<usize>| {
-        let frames = &frames[range];
-        frames.iter().filter(|f| f.chosen == 1).count() as f64 / frames.len() as f64
-    };
-    assert!(with_two(0..300) > 0.95, "{}", with_two(0..300));
-    assert!(with_two(500..900) < 0.1, "{}", with_two(500..900));
-    assert!(with_two(5000..6000) > 0.9, "{}", with_two(5000..6000));
+    let [before, during, after] = [0..300, 500..900, 5000..6000].map(|range| count(&frames[range], 1));
+    assert!(before > 285, "{before} of 300 frames before");
+    assert!(during < 40, "{during} of 400 frames beside the other program");
+    assert!(after > 900, "{after} of 1000 frames after");
 }
 
 fn tuning_of_threads() -> Tuning {
@@ -273,25 +275,15 @@ fn policy_with_incremental() -> Policy {
 fn what_rebuilds_too_often_is_left_and_taken_up_again() {
     // Up to frame 600 the first rebuilds in one frame of three, which the tuning does not predict.
     let mut policy = policy_with_incremental();
-    let truth = |k: usize, n: f64, at: usize| {
-        let rebuilds = at < 600 && at.is_multiple_of(3);
-        n * if k == 1 {
-            20.0
-        } else if rebuilds {
-            90.0
-        } else {
-            10.0
-        }
-    };
-    let work = |k: usize, at: usize| {
-        let rebuilt = at < 600 && at.is_multiple_of(3);
-        (k == 0).then(|| FrameWork::new(if rebuilt { FrameKind::Rebuilt } else { FrameKind::Updated }, 1.0))
-    };
+    let rebuilds = |at: usize| at < 600 && at.is_multiple_of(3);
+    let truth = move |k: usize, n: f64, at: usize| n * [if rebuilds(at) { 90.0 } else { 10.0 }, 20.0][k];
+    let kind = |at: usize| if rebuilds(at) { FrameKind::Rebuilt } else { FrameKind::Updated };
+    let work = |k: usize, at: usize| (k == 0).then(|| FrameWork::new(kind(at), 1.0));
     let frames = run_told(&mut policy, 0..3000, 1000, &truth, &work);
-    let kept = |range: Range<usize>| frames[range].iter().filter(|f| f.chosen == 0).count();
     // (10 + 10 + 90) / 3 is more than 20. Rare trials check that.
-    assert!(kept(0..100) > 0 && kept(200..600) < 260, "{} of 400", kept(200..600));
-    assert!(kept(2500..3000) > 450, "{} of 500", kept(2500..3000));
+    let [first, second, last] = [0..100, 200..600, 2500..3000].map(|range| count(&frames[range], 0));
+    assert!(first > 0 && second < 260, "{second} of 400");
+    assert!(last > 450, "{last} of 500");
 }
 
 /// Frames of an incremental algorithm alone can't show whether the machine is slower than predicted, or the savings in
@@ -302,8 +294,8 @@ fn what_keeps_work_and_spares_less_than_believed_is_left_in_the_end() {
     let truth = |k: usize, n: f64, _: usize| n * [35.0, 20.0][k];
     let work = |k: usize, _: usize| (k == 0).then(|| FrameWork::new(FrameKind::Updated, 1.0));
     let frames = run_told(&mut policy, 0..10_000, 1000, &truth, &work);
-    let kept = |range: Range<usize>| frames[range].iter().filter(|f| f.chosen == 0).count();
-    assert!(kept(3000..10_000) < 350, "{} of 7000", kept(3000..10_000));
+    let kept = count(&frames[3000..], 0);
+    assert!(kept < 350, "{kept} of 7000");
 }
 
 /// A frame on two threads that stops at a breakpoint for a second says nothing about later frames.
@@ -312,8 +304,8 @@ fn one_long_frame_bans_no_number_of_threads() {
     let truth = |k: usize, n: f64, at: usize| n * [100.0, 60.0][k] + if at == 500 { 1.0e9 } else { 0.0 };
     let mut policy = policy(tuning_of_threads());
     let frames = run(&mut policy, 0..2000, 1000, &truth);
-    assert!(frames[400..500].iter().filter(|f| f.chosen == 1).count() > 90);
-    let away = frames[501..].iter().filter(|f| f.chosen == 0).count();
+    assert!(count(&frames[400..500], 1) > 90);
+    let away = count(&frames[501..], 0);
     assert!(away < 250, "on one thread for {away} of the 1500 frames after the long one");
 }
 
@@ -323,8 +315,8 @@ fn a_scene_that_makes_a_method_quadratic_is_left_to_another() {
     // From frame 200 on the first costs a hundred times as much.
     let truth = |k: usize, n: f64, at: usize| n * [if at < 200 { 50.0 } else { 5000.0 }, 100.0][k];
     let frames = run(&mut policy(tuning(&costs)), 0..1200, 1000, &truth);
-    assert!(frames[..200].iter().filter(|f| f.chosen == 0).count() > 190);
-    let dear = frames[200..].iter().filter(|f| f.chosen == 0).count();
+    assert!(count(&frames[..200], 0) > 190);
+    let dear = count(&frames[200..], 0);
     assert!(dear <= 6, "{dear} frames spent on it");
 }
 
