@@ -9,8 +9,9 @@ use crate::{Error, Pairs};
 /// Every list is sorted, and each pair has its lower id first. So the lists are the same, bit for bit, whatever
 /// algorithm found the pairs and in whatever order, also with [`PairOrder::Any`](crate::PairOrder::Any).
 ///
-/// Positions may change from frame to frame, as with `swap_remove`: a pair lasts while both ids do. Boxes with the same
-/// id count as one: a pair of two of them is left out, and two ids are one pair however many of their boxes overlap.
+/// Positions may change from frame to frame, as with `swap_remove`: a pair lasts while both ids do. Boxes with the
+/// same id count as one: a pair of two of them is left out, and two ids are one pair however many of their boxes
+/// overlap.
 ///
 /// An update sorts the pairs as 64-bit numbers and compares them with those of the previous update. On one core of an
 /// AMD EPYC this takes 10 to 20 ns a pair with 1000 to 100 000 pairs, or a third of that if the pairs have canonical
@@ -32,7 +33,7 @@ use crate::{Error, Pairs};
 pub struct Changes<Id = u32> {
     /// The ids of the last update.
     ids: Vec<Id>,
-    /// The same ids, ascending, each with its position.
+    /// The ids of the last update, ascending, each with its position.
     sorted: Vec<(Id, u32)>,
     /// For each position, the first place of its id in `sorted`.
     ranks: Vec<u32>,

@@ -52,14 +52,14 @@ pub struct Work {
     pub fallback: Option<Fallback>,
     /// Last-level cache of the machine, for [`Term::ColdObjects`].
     pub cache_bytes: f64,
-    /// What the terms leave unexplained.
+    /// The part of the cost that the terms do not explain.
     pub residual: Option<Residual>,
 }
 
 /// The work of another method that is done instead.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fallback {
-    /// That work. It has no fallback of its own.
+    /// The other work. It has no fallback of its own.
     pub work: Arc<Work>,
     /// Factor on its cost here.
     pub factor: f64,

@@ -1,4 +1,4 @@
-//! What the other crates of this repository share with this one. No promise is made about it.
+//! Items for the other crates of this repository. No promise is made about them.
 
 pub use crate::adaptive::{Arrival, Background, Instances, Origin, SaveError, Setup, Start};
 pub use crate::broad_phase::check_count;

@@ -20,7 +20,7 @@ pub struct Ray {
 }
 
 crate::described! {
-    /// What makes a ray invalid.
+    /// A defect that makes a ray invalid.
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
     #[non_exhaustive]
     pub enum RayDefect {

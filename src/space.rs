@@ -77,7 +77,7 @@ pub struct Space {
     active: Active,
     resting: Resting,
     neighbours: Neighbours,
-    /// Of the active bodies, from the first query after an update on.
+    /// The tree of the active bodies, built by the first query after an update.
     tree: OnceLock<Tree>,
     /// The pairs of resting bodies, which are the first in `pairs`.
     links: Links,

@@ -9,7 +9,7 @@ pub fn next(state: &mut u64) -> u64 {
     mix(*state)
 }
 
-/// The finaliser: every input bit affects every output bit.
+/// Mixes a number so that every input bit affects every output bit (the finaliser of splitmix64).
 pub fn mix(mut x: u64) -> u64 {
     x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);

@@ -87,7 +87,7 @@ impl Runner {
         self.awaits && self.decided.is_none()
     }
 
-    /// Goes on with another tuning and its algorithms. The estimate of the load stays.
+    /// Replaces the tuning and the instances. The estimate of the load stays.
     pub(super) fn replace(&mut self, tuning: Tuning, made: Instances) {
         let Policy { learns, explores, .. } = self.policy;
         self.policy = policy(tuning, &made);
@@ -97,7 +97,7 @@ impl Runner {
         self.choices().into_iter().for_each(|k| self.warm(k, self.prepared));
     }
 
-    /// Goes on with other instances of the same algorithms.
+    /// Replaces the instances by others of the same algorithms.
     pub(super) fn remake(&mut self, made: Instances) {
         self.catch_up();
         self.policy.remade(&made.kept(), &made.usable());

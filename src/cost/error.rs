@@ -1,11 +1,11 @@
-//! What makes a cost curve unusable.
+//! Defects of a cost curve.
 
 use super::{MOST_UNIT_NS, Product, Term};
 
 const MOST_POWERS: u32 = Product::MOST_POWERS;
 
 crate::described! {
-    /// What makes a cost curve unusable.
+    /// A defect that makes a cost curve unusable.
     #[derive(Debug, Clone, Copy, PartialEq)]
     #[non_exhaustive]
     pub enum CurveError {

@@ -1,4 +1,4 @@
-//! What the terms of a cost leave unexplained, as a function of the load.
+//! The part of a cost that its terms do not explain, as a function of the load.
 //!
 //! A Gaussian process with inducing points (Quiñonero-Candela and Rasmussen, A unifying view of sparse approximate
 //! Gaussian process regression, 2005): a weighted sum of the load's similarity to each of some places. Far from all
@@ -31,7 +31,7 @@ const EXPONENT_LOG2: u32 = 4;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Places {
     loads: Vec<Load>,
-    /// By coordinate, then by place.
+    /// The coordinates of all places, ordered by coordinate, then by place.
     coordinates: Vec<f64>,
     /// Base-2 logarithms of the fewest and the most objects; loads outside are clamped.
     octaves: [f64; 2],

@@ -104,7 +104,7 @@ impl Term {
     }
 }
 
-/// What the terms of all algorithms share under one load, computed once for each decision.
+/// The values that the terms of all algorithms share under one load, computed once for each decision.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Counts<'a> {
     pub(super) load: &'a Load,

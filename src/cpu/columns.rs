@@ -45,7 +45,7 @@ impl Columns {
         self.len
     }
 
-    /// All boxes, open for writing.
+    /// Returns all boxes, open for writing.
     pub(crate) fn as_mut(&mut self) -> ColumnsMut<'_> {
         let len = self.len;
         ColumnsMut {
@@ -56,7 +56,7 @@ impl Columns {
         }
     }
 
-    /// The boxes in parts of this length, open for writing.
+    /// Returns the boxes in parts of `size`, open for writing.
     pub(crate) fn parts(&mut self, size: usize) -> impl Iterator<Item = ColumnsMut<'_>> + Send {
         let ColumnsMut { low, high, ids, begins } = self.as_mut();
         let (mut low, mut high) = (low.map(|c| c.chunks_mut(size)), high.map(|c| c.chunks_mut(size)));

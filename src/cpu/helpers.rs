@@ -16,7 +16,7 @@ pub(crate) struct Helpers {
     pub(crate) count: u32,
     /// Whether each own one is pinned to its own CPU if that is allowed, and if there is one CPU more than helpers.
     pinned: bool,
-    /// Nothing before the start.
+    /// The running helpers; unset before the start.
     team: OnceLock<Team>,
     /// Whether to do as if the system refused them.
     #[cfg(test)]
@@ -176,7 +176,7 @@ mod tests {
         let (seen, all) = (Mutex::new(Vec::new()), Barrier::new(all));
         helpers.run(threads, &|| {
             seen.lock().unwrap().push(current().id());
-            // With one thread less, nobody would get past this; with one more, that one would be left behind.
+            // With one thread less, all would wait here for ever; with one more, that one would.
             all.wait();
         });
         seen.into_inner().unwrap()

@@ -6,8 +6,8 @@
 //! list of open phases, under its lock, and is counted from then on. When nothing is left to do, the caller takes its
 //! phase off the list and waits for the counted helpers only.
 //!
-//! A frame is several phases. Waking a thread takes longer than many of them, so helpers linger between the phases of a
-//! frame: they spin, for a bounded time, until the next phase opens or the frame ends.
+//! A frame is several phases. Waking a thread takes longer than many of them, so helpers linger between the phases of
+//! a frame: they spin, for a bounded time, until the next phase opens or the frame ends.
 //!
 //! This needs `unsafe`: a closure that borrows stands in a shared list. Safe code has only scopes, which wait for jobs
 //! that never ran.
@@ -65,7 +65,7 @@ struct Open {
     latch: Arc<Latch>,
 }
 
-/// What the caller waits on.
+/// The latch on which the caller of a phase waits for its helpers.
 #[derive(Default)]
 struct Latch {
     /// [`ASLEEP`], and [`HELPER`] times the helpers that have joined and not left.
@@ -104,10 +104,10 @@ impl Phases {
         let latch = self.list().spare.pop().unwrap_or_default();
         // Made first: nothing leaves this function, not even a panic, before the phase is closed.
         let phase = Joinable { phases: self, latch: &latch };
-        // SAFETY: only the lifetime changes. The reference stands in the list until `phase` is dropped, which is within
-        // this function, where `work` lives. A helper copies it from the list under the lock, and is counted in the
-        // latch under that same lock; it counts itself off after its last use. Dropping `phase` takes the reference off
-        // the list and returns when none is counted.
+        // SAFETY: only the lifetime changes. The reference stands in the list until `phase` is dropped, which is
+        // within this function, where `work` lives. A helper copies it from the list under the lock, and is counted in
+        // the latch under that same lock; it counts itself off after its last use. Dropping `phase` takes the
+        // reference off the list and returns when none is counted.
         let work_for_helpers = unsafe { std::mem::transmute::<Work<'_>, Work<'static>>(work) };
         let missing = {
             let mut list = self.list();
@@ -201,7 +201,7 @@ impl Drop for Joinable<'_> {
 }
 
 impl Latch {
-    /// Works, and keeps the first panic: the caller works on and resumes it when all is done.
+    /// Calls `work`, and keeps the first panic. The caller of the phase goes on, and resumes the panic at the end.
     fn catch_panic(&self, work: Work<'_>) {
         let mut end = catch_unwind(AssertUnwindSafe(work));
         if end.is_err() {

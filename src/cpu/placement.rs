@@ -145,7 +145,7 @@ fn current_cpu() -> usize {
 mod tests {
     use super::*;
 
-    /// A machine of `cores` physical cores with two hyper-threads each: `k` and `k + cores`.
+    /// Returns a machine of `cores` physical cores with two hyper-threads each: `k` and `k + cores`.
     fn machine(cores: usize) -> Vec<Cpu> {
         (0..2 * cores).map(|id| Cpu { id: CoreId { id }, physical: id % cores }).collect()
     }

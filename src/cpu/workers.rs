@@ -15,7 +15,7 @@ use std::sync::{Mutex, PoisonError};
 pub struct Workers {
     threads: usize,
     tasks: usize,
-    /// With the method that has them.
+    /// The method and its helpers.
     #[cfg(feature = "parallel")]
     helpers: Option<(&'static str, Arc<Helpers>)>,
 }

@@ -1,4 +1,4 @@
-//! What methods derive from a filter.
+//! The sets of boxes that methods derive from a filter.
 
 use super::{Filter, Membership};
 

@@ -1,4 +1,4 @@
-//! What a body may meet.
+//! The properties of a body.
 
 use crate::Membership;
 

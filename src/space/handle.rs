@@ -27,7 +27,7 @@ use std::num::NonZeroU64;
 pub struct Handle(NonZeroU64);
 
 impl Handle {
-    /// `generation` is not 0.
+    /// Makes a handle. `generation` must not be 0.
     pub(super) fn new(slot: u32, generation: u32) -> Self {
         Self(NonZeroU64::MIN.saturating_add((u64::from(slot) << 32 | u64::from(generation)) - 1))
     }

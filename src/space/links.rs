@@ -82,8 +82,8 @@ impl Links {
         }
     }
 
-    /// In the lists of both bodies of a pair, lets the pair before it point to `next`, and the one behind to
-    /// `previous`.
+    /// Sets, in the lists of both bodies of a pair, the next pair of the one before it to `next`, and the previous
+    /// pair of the one behind it to `previous`.
     fn point(&mut self, link: &Link, next: [u32; 2], previous: [u32; 2]) {
         for k in 0..2 {
             let (slot, before, behind) = (link.slots[k], link.previous[k], link.next[k]);

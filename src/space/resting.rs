@@ -4,8 +4,7 @@ use super::slots::Slots;
 use crate::cpu::{GrownTree, Input, Members, Simd, SimdLevel, Tree, Wear, Workers};
 use crate::{Aabb, Error, SceneStats};
 
-/// What it costs to sort a box into a tree, in nodes looked at by queries: 25 and 5 ns on the Zen 3 host of
-/// `datasets/`.
+/// Cost of sorting a box into a tree, in nodes that queries look at: 25 and 5 ns on the Zen 3 host of `datasets/`.
 const SORT_IN_NODES: u64 = 5;
 
 /// Queries of a fresh tree from which it is learned how many nodes one looks at.
@@ -17,7 +16,7 @@ pub(super) struct Resting {
     tree: GrownTree,
     /// Bodies that came since the last update.
     arrivals: Vec<u32>,
-    /// Those that came in the last update, when the epoch rose by 1.
+    /// Bodies that came in the last update, when the epoch rose by 1.
     pub(super) arrived: Vec<u32>,
     /// Whether the body in a slot is among those of the last update: one bit each, so that all stay in the cache.
     bits: Vec<u64>,

@@ -18,7 +18,7 @@ pub(super) enum At {
     Resting,
 }
 
-/// What was done to a body since the last update: one bit each.
+/// Changes of a body since the last update, one bit each.
 const SET: u8 = 1;
 pub(super) const SET_BODY: u8 = 2;
 pub(super) const REMOVED: u8 = 4;
@@ -37,7 +37,7 @@ struct Slot {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Slots {
     slots: Vec<Slot>,
-    /// By slot. Those of free slots are unspecified.
+    /// Boxes by slot. Those of free slots are unspecified.
     pub(super) boxes: Vec<Aabb>,
     bodies: Vec<Body>,
     /// Slots without a body. The last one is used first.

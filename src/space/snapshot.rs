@@ -16,18 +16,18 @@ struct Snapshot {
     slots: Vec<Slot>,
     /// The slots without a body. The last one is used first.
     free: Vec<u32>,
-    /// By slot, the lower one first, as of the last update. First the pairs of two resting bodies, in the order of
+    /// Pairs of slots at the last update, the lower slot first. First the pairs of two resting bodies, in the order of
     /// [`Space::pairs`]; then all others, ascending.
     pairs: Vec<(u32, u32)>,
     begun: Vec<(Handle, Handle)>,
     ended: Vec<(Handle, Handle)>,
-    /// Of [`Space::set_limit`].
+    /// The limit of [`Space::set_limit`].
     limit: Option<usize>,
 }
 
 #[derive(serde::Serialize, serde::Deserialize)]
 struct Slot {
-    /// Of the body in the slot; if the slot is free, of the next one.
+    /// The generation of the body in the slot; if the slot is free, that of the next one.
     generation: u32,
     held: Option<Held>,
 }

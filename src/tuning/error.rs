@@ -1,10 +1,10 @@
-//! What makes a tuning unusable.
+//! Defects of a tuning.
 
 use crate::AlgorithmId;
 use crate::cost::CurveError;
 
 crate::described! {
-    /// What makes a tuning unusable.
+    /// A defect that makes a tuning unusable.
     #[derive(Debug, Clone, PartialEq)]
     #[non_exhaustive]
     pub enum TuningError {

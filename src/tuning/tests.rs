@@ -51,12 +51,12 @@ fn for_running_gives_the_fields_of_a_tree_to_pair_cache() {
     let sides = tuning.crossovers.iter().map(|c| [c.below.to_string(), c.above.to_string()]);
     assert!(sides.eq(names.windows(2).map(|pair| [pair[0].clone(), pair[1].clone()])), "{:?}", tuning.crossovers);
     assert_eq!(tuning.costs.len(), 4);
-    // What would stand in is missing.
+    // `pair-cache@cpu2` would replace others, and is missing.
     let whole = all(&["pair-cache@cpu1"]);
     assert_eq!(whole.clone().for_running(), whole);
 }
 
-/// Found by the fuzz target `files`: what was written could not be read again.
+/// Found by the fuzz target `files`: the written tuning could not be read again.
 #[test]
 fn a_slice_through_no_load_leaves_sound_tuning() {
     let costs =

@@ -7,8 +7,8 @@ use crate::{Filter, Membership};
 /// Boxes to prefetch ahead.
 const AHEAD: usize = LANES;
 
-/// The memberships in the lanes of a node. That of several boxes is their union, which wants every box that one of them
-/// wants, and perhaps others.
+/// The memberships in the lanes of a node. That of several boxes is their union, which wants every box that one of
+/// them wants, and perhaps others.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
 pub(crate) struct Marks {
@@ -19,10 +19,10 @@ pub(crate) struct Marks {
     moving: u32,
 }
 
-/// Of a lane without a box. No box in no group is in a pair.
+/// The membership of a lane without a box. A box in no group is in no pair.
 const NONE: Membership = Membership { groups: 0, mask: 0, fixed: true, owner: 0 };
 
-/// What a walk tests beside the bounds of a node: memberships, or `()`, nothing.
+/// The test of a walk beside that of bounds: memberships, or `()` for no test.
 pub(crate) trait Wanted: Copy {
     /// Whether all unwanted boxes are ruled out.
     const TESTS: bool;

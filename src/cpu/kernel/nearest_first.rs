@@ -4,7 +4,7 @@ use super::walk::{MOST_LEVELS, Walk};
 use super::{LANES, Level, Node, at_level, prefetch};
 use crate::pairs::each_bit;
 
-/// What near and far mean. A lane that contains another has no larger measure.
+/// The measure by which a walk goes from near to far. A lane that contains another has no larger measure.
 pub(crate) trait Measure: Copy {
     /// Writes the measure of each lane, at least 0, to `to`. Returns a mask: bit k is set if lane k holds a box with a
     /// measure of at most `most`. The measures of the other lanes are unspecified.

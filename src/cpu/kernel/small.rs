@@ -31,7 +31,7 @@ fn small<L: Level>(view: &View<'_>, first: u32, pairs: &mut Pairs, level: L) {
     let mut hits = [0; MOST_ROWS];
     let hits = &mut hits[..view.len];
     for at in (0..view.len).step_by(L::Rows::COUNT) {
-        // Those before these rows, and these.
+        // The rows up to the end of this vector.
         let rows = view.len.min(at + L::Rows::COUNT);
         let (low, high) = (view.low.map(|c| &c[..rows]), view.high.map(|c| &c[..rows]));
         for (row, hits) in hits[..rows].iter_mut().enumerate() {

@@ -4,7 +4,7 @@ use super::{Level, at_level};
 use crate::cpu::{Simd, SimdLevel};
 use std::hint::black_box;
 
-/// One pass of a = b + s * c with the widest vectors in use.
+/// Runs one pass of a = b + s * c with the widest vectors in use.
 ///
 /// x86-64 defaults to 128-bit vectors: with them one thread reached 0.90 of the bandwidth of a C program that was
 /// compiled for the machine, and 1.02 of it with 512-bit ones.

@@ -28,7 +28,7 @@ struct Side<'a, W: Wanted> {
     bounds: &'a Aabb,
     ids: &'a [u32; LANES],
     marks: W,
-    /// What the marks of others are tested by.
+    /// The query for the marks of others.
     by: &'a W::Query,
 }
 

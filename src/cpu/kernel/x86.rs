@@ -1,4 +1,4 @@
-//! What AVX2 and AVX-512 do in another way than other levels.
+//! The operations for which AVX2 and AVX-512 have their own code.
 
 use super::{BLOCK, LANES, Level, View};
 use crate::cpu::level::{Avx2, Avx512};

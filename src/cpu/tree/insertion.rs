@@ -24,7 +24,7 @@ impl Tree {
             self.inserted.sort_unstable();
         }
         let sorted = self.leaves.len();
-        // Where the last new leaf belongs.
+        // The position in `leaves` near which the last new leaf belongs.
         let mut last = None;
         for at in 0..self.inserted.len() {
             let (code, id) = ((self.inserted[at] >> 32) as u32, self.inserted[at] as u32);

@@ -23,15 +23,15 @@ pub(super) struct Order {
     keys: Vec<u64>,
     len: usize,
     scratch: Vec<u64>,
-    /// Where the boxes of each shape stand that were [sorted](Self::sort), active ones first: the axes on which they
-    /// are oversized, one bit each, and their places in the order.
+    /// For each shape of the [sorted](Self::sort) boxes, active ones first: the axes on which the boxes are oversized, one
+    /// bit each, and their places in the order.
     pub(super) shapes: Vec<(u32, Range<usize>)>,
     /// Code of the first active box of each leaf, ascending.
     pub(super) starts: Vec<u32>,
     /// Dense cells that are not sorted yet: the large ones, and the others.
     large: Vec<Range<usize>>,
     small: Vec<Range<usize>>,
-    /// What each task found in its part of a large dense cell.
+    /// The spread that each task found in its part of a large dense cell.
     spreads: Vec<Spread>,
 }
 

@@ -13,7 +13,7 @@ use std::collections::BinaryHeap;
 /// A box near a point. The nearest is the least; of two at the same distance it is the one with the lower id.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Near {
-    /// Of the distance, which is not negative: bits have the order of distances.
+    /// The bits of the distance. It is not negative, so bits have the order of distances.
     bits: u32,
     /// The name of the box.
     pub(crate) id: u32,
@@ -37,8 +37,8 @@ impl Tree {
         self.overlapping_wanted(bounds, || Membership::ALL, found)
     }
 
-    /// Does the same, but leaves out boxes that are unwanted `by` the box with the bounds, if the tree was built with a
-    /// filter.
+    /// Does the same, but leaves out boxes that are unwanted `by` the box with the bounds, if the tree was built with
+    /// a filter.
     #[inline]
     pub(crate) fn overlapping_wanted(
         &self,

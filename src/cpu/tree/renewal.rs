@@ -21,8 +21,8 @@ pub(super) struct Renewal {
 
 impl Tree {
     /// Sorts all boxes anew, in several calls of which none takes long. Returns whether they stand in the new order
-    /// now, but for those that are `out` of the tree: the ones that have `jumped` since the last call, and new ones. If
-    /// the number of boxes has changed since the last call, this begins again.
+    /// now, but for those that are `out` of the tree: the ones that have `jumped` since the last call, and new ones.
+    /// If the number of boxes has changed since the last call, this begins again.
     pub(crate) fn renew(
         &mut self,
         input: Input<'_>,
@@ -34,7 +34,7 @@ impl Tree {
         let begin = || Renewal { curve: Curve::over(&stats(), len), boxes: len, step: 0, active: 0 };
         let mut renewal = self.renewal.take().filter(|renewal| renewal.boxes == len).unwrap_or_else(begin);
         if renewal.step <= RENEWAL_PARTS {
-            // Those that were coded before they jumped.
+            // Only boxes whose codes were made before they jumped.
             let known = part(len, renewal.step, RENEWAL_PARTS).start;
             let jumped = jumped.filter(|&id| (id as usize) < known);
             jumped.for_each(|id| self.order.code_again(id, boxes, &renewal.curve, screen));

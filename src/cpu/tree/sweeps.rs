@@ -11,7 +11,7 @@ use crate::cpu::{LANES, Simd, Walk, part};
 use crate::{Aabb, Error, Pairs};
 use std::ops::Range;
 
-/// What a copy of a leaf costs, and two copies that meet, in [tests of the tree](Walk::tests).
+/// Costs of a copy of a leaf, and of two copies that meet, in [tests of the tree](Walk::tests).
 const COPY: u64 = 60;
 const MEETING: u64 = 16;
 
@@ -31,7 +31,7 @@ pub(super) struct Sweeps {
     sorted: Vec<Tree>,
     /// Two of these for each sweep.
     swept: Vec<[usize; 2]>,
-    /// The same pairs of kinds in the tree: leaves that need not be compared.
+    /// For each sweep, the leaves in the tree that need not be compared.
     pub(super) apart: Vec<Apart>,
 }
 

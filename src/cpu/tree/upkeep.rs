@@ -22,7 +22,7 @@ const UNMEASURED: f64 = 1.0;
 /// See the module.
 #[derive(Debug, Default)]
 pub(crate) struct Upkeep {
-    /// About the tree that the previous call left. `None`: it can't be refitted.
+    /// State of the tree that the previous call left; `None` if it can't be refitted.
     tree: Option<Known>,
     /// Frames until a refit is tried again, and their number after the next useless refit.
     pause: u32,
@@ -99,7 +99,7 @@ fn each_ns(since: Instant, boxes: usize) -> f64 {
 }
 
 impl Upkeep {
-    /// `timed`: measured times decide, and not areas alone.
+    /// Makes the upkeep of a tree. If `timed`, measured times decide too, and not areas alone.
     pub(crate) fn new(timed: bool) -> Self {
         Self { timed, ..Self::default() }
     }
@@ -189,7 +189,7 @@ impl Upkeep {
 mod tests {
     use super::*;
 
-    /// A frame of this many boxes in which a build, a refit and a search took these nanoseconds for each box.
+    /// Runs a frame of `boxes` boxes in which a build, a refit and a search took these nanoseconds for each box.
     fn frame(costs: &mut Costs, boxes: usize, [build, refit, search]: [f64; 3]) {
         costs.begin(boxes);
         costs.add_build(build);

@@ -10,7 +10,7 @@ fn draw(state: &mut u64) -> f64 {
     (splitmix::next(state) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// Random curves of many terms with residuals, and loads whose motion falls while the objects rise.
+/// Returns random curves of many terms with residuals, and loads whose motion falls with the number of objects.
 pub(in crate::tuning) fn drawn(seed: u64) -> (Vec<AlgorithmCost>, Vec<Load>) {
     let load = |k: i32| {
         let n = 10.0_f64.powf(f64::from(k) / 4.0).round();

@@ -4,7 +4,7 @@ use crate::{SceneStats, splitmix};
 
 const INF: f32 = f32::INFINITY;
 
-/// Draws.
+/// Draws random numbers.
 struct Random(u64);
 
 impl Random {
@@ -12,7 +12,7 @@ impl Random {
         (splitmix::next(&mut self.0) >> 20) % n
     }
 
-    /// A multiple of a quarter, so that boxes, rays and points often touch.
+    /// Returns a multiple of a quarter, so that boxes, rays and points often touch.
     fn coordinate(&mut self) -> f32 {
         self.below(81) as f32 / 4.0 - 10.0
     }
@@ -21,13 +21,13 @@ impl Random {
         [0; 3].map(|_| self.coordinate())
     }
 
-    /// Off the lattice, if `odd`.
+    /// Returns a vector, off the lattice if `odd`.
     fn vector(&mut self, odd: bool) -> [f32; 3] {
         let by = if odd { 0.013 * self.below(77) as f32 } else { 0.0 };
         self.point().map(|v| v + by)
     }
 
-    /// Flat, long, infinite, or neither.
+    /// Returns a box, at random flat, long or infinite.
     fn aabb(&mut self) -> Aabb {
         let mut b = Aabb::cube(self.point(), 0.25 * self.below(6) as f32);
         let axis = self.below(3) as usize;
@@ -43,7 +43,8 @@ impl Random {
     }
 }
 
-/// Trees at every level, and the boxes that are in them: of those that were built, some are removed and appended.
+/// Returns a tree at every level, and the boxes in it. With `churn` some boxes were removed after the build, and some
+/// of those inserted elsewhere.
 fn trees(random: &mut Random, len: usize, churn: bool) -> (Vec<Tree>, Vec<Option<Aabb>>) {
     let mut boxes: Vec<Aabb> = (0..len).map(|_| random.aabb()).collect();
     (0..len / 10).for_each(|k| boxes[2 * k + 1] = boxes[2 * k]);
@@ -80,7 +81,7 @@ fn trees(random: &mut Random, len: usize, churn: bool) -> (Vec<Tree>, Vec<Option
     (trees, present)
 }
 
-/// The scenes: empty, one leaf, several levels, more than one node at the top.
+/// Calls `check` for scenes with no box, one leaf, several levels, and more than one node at the top.
 fn each_scene(mut check: impl FnMut(&mut Random, &[Tree], &[Option<Aabb>])) {
     let mut random = Random(7);
     for (len, churn) in [(0, false), (1, false), (15, false), (300, false), (300, true), (5000, false), (6000, true)] {
@@ -89,7 +90,7 @@ fn each_scene(mut check: impl FnMut(&mut Random, &[Tree], &[Option<Aabb>])) {
     }
 }
 
-/// The `t` at which a moved box meets another, by the documented formula and no infinity times zero.
+/// Returns the `t` at which a moved box meets another, by the documented formula without infinity times zero.
 fn naive_cast(moved: &Aabb, motion: [f32; 3], max: f32, b: &Aabb) -> Option<f32> {
     let (mut enter, mut leave) = (0.0_f32, max.min(f32::MAX));
     for (a, along) in motion.into_iter().enumerate() {
@@ -112,7 +113,7 @@ fn point(at: [f32; 3]) -> Aabb {
     Aabb::new(at, at)
 }
 
-/// All that a moved box meets, with the bits of `t`.
+/// Returns the boxes that a moved box meets, with the bits of `t`.
 fn cast(tree: &Tree, moved: &Aabb, motion: [f32; 3], max: f32) -> Vec<(u32, u32)> {
     let mut found = Vec::new();
     tree.cast_box(moved, motion, max, |id, t| {
@@ -168,7 +169,7 @@ fn moved_boxes_meet_what_the_double_loop_finds() {
             let mut motion = random.vector(k % 2 == 0);
             (0..3).filter(|a| k >> (2 + a) & 1 == 1).for_each(|a| motion[a] = 0.0);
             check_casts(trees, boxes, &moved, motion, if k % 3 == 0 { INF } else { 0.5 });
-            // What it overlaps, it meets at once.
+            // It meets the boxes that it overlaps at once.
             for tree in trees {
                 let mut overlapping = Vec::new();
                 let looked = tree.overlapping(&moved, |id| overlapping.push((id, 0)));
