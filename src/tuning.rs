@@ -7,7 +7,7 @@ mod file;
 mod slice;
 
 use crate::algorithm::BackendClass;
-use crate::cost::Residual;
+use crate::cost::{Places, Residual};
 use crate::{AlgorithmId, Load, Registry, named};
 use slice::Slice;
 use std::sync::Arc;
@@ -118,7 +118,7 @@ impl AlgorithmCost {
     }
 
     /// Returns its residuals: of the work, of the whole curve, and of the fallback.
-    pub(crate) fn residuals(&self) -> impl Iterator<Item = &Residual> {
+    fn residuals(&self) -> impl Iterator<Item = &Residual> {
         let fallback = self.curve.work.fallback.iter().filter_map(|f| f.work.residual.as_ref());
         self.curve.work.residual.iter().chain(&self.curve.residual).chain(fallback)
     }
@@ -274,6 +274,11 @@ impl Tuning {
         self.steps[..self.steps.partition_point(|s| s.from_objects <= objects)].last()
     }
 
+    /// Returns the places of the first residual, which all others share.
+    pub(crate) fn places(&self) -> Option<&Arc<Places>> {
+        self.costs.iter().flat_map(AlgorithmCost::residuals).map(|residual| &residual.places).next()
+    }
+
     /// Returns the first defect that makes this tuning unusable, if any.
     pub fn defect(&self) -> Option<TuningError> {
         // Without loads there are no steps, and the costs decide.
@@ -287,11 +292,10 @@ impl Tuning {
         if let Some(c) = self.crossovers.iter().find(|c| !c.is_sound()) {
             return Some(TuningError::Crossover { below: c.below.clone(), above: c.above.clone() });
         }
-        let places = || self.costs.iter().flat_map(AlgorithmCost::residuals).map(|r| &r.places);
+        let places = self.places();
         for (k, cost) in self.costs.iter().enumerate() {
             let algorithm = || cost.algorithm.clone();
-            let other =
-                |own: &Residual| places().next().is_some_and(|p| !Arc::ptr_eq(p, &own.places) && **p != *own.places);
+            let other = |own: &Residual| places.is_some_and(|p| !Arc::ptr_eq(p, &own.places) && **p != *own.places);
             if cost.residuals().any(other) {
                 return Some(TuningError::Places { algorithm: algorithm() });
             }

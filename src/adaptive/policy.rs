@@ -192,8 +192,7 @@ impl Policy {
     /// Returns the costs with corrections.
     pub(super) fn learned_costs(&self) -> Vec<AlgorithmCost> {
         let costs = &self.tuning.costs;
-        let mut known = costs.iter().flat_map(AlgorithmCost::residuals).map(|residual| &residual.places);
-        let places = known.next().map_or_else(Places::usual, Arc::clone);
+        let places = self.tuning.places().map_or_else(Places::usual, Arc::clone);
         let learned = |(k, cost): (usize, &AlgorithmCost)| {
             let mut cost = cost.clone();
             let none = || Residual::new(Arc::clone(&places), Vec::new(), false);

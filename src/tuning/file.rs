@@ -114,8 +114,7 @@ impl Works {
 
 impl From<Tuning> for TuningFile {
     fn from(tuning: Tuning) -> Self {
-        let residual = tuning.costs.iter().flat_map(AlgorithmCost::residuals).next();
-        let places = residual.map_or_else(Vec::new, |r| r.places.loads().to_vec());
+        let places = tuning.places().map_or_else(Vec::new, |places| places.loads().to_vec());
         let mut works = Works::default();
         let cost = |AlgorithmCost { algorithm, revision, curve, spread_ln }| CostFile {
             algorithm,
