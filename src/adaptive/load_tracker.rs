@@ -12,8 +12,8 @@ use crate::load::{Displacement, FramePlan, Load, Motion, is_same_pace};
 const SAMPLE_SHARE: f64 = 0.002;
 const LOOK_SHARE: f64 = 0.002;
 
-/// The time of a sample or a look counts as at most this many times the previous one. Otherwise an interruption by the
-/// system would delay the next one for seconds.
+/// Cap on the time of a sample or a look, in multiples of the previous one. Otherwise an interruption by the system
+/// would delay the next one for seconds.
 const COST_RISES: f64 = 2.0;
 
 /// Fewest frames between two samples, unless the number of objects [drifts](drift) by more than `DRIFTED`.

@@ -10,7 +10,7 @@ const MOST_FRAMES: f64 = 1024.0;
 /// frame's number, and by more than `JUMP_LEAST`.
 const JUMP_PART: u32 = 4;
 const JUMP_LEAST: u32 = 16;
-/// Weight of a decision in the mean time of decisions, and the most times that mean as which it counts.
+/// Weight of a decision in the mean time of decisions, and the cap on its time, in multiples of that mean.
 const WEIGHT: f64 = 1.0 / 8.0;
 const MOST_RISE: f64 = 4.0;
 

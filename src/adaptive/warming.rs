@@ -53,7 +53,7 @@ impl Place {
         };
     }
 
-    /// Takes the algorithm back from its thread if it is ready; waits until it is with `patience`. Returns whether the
+    /// Takes the algorithm back from its thread if it is ready. With `patience`, waits until it is. Returns whether the
     /// thread has ended.
     pub(super) fn take_back(&mut self, patience: bool) -> bool {
         let Self::Away(Preparing(thread)) = self else { return false };
