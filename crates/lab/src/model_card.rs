@@ -112,7 +112,7 @@ fn regrets(regrets: Option<Regrets>) -> String {
 }
 
 /// Returns what was held out, and the scores as a table that `draw` draws.
-pub fn scores(validation: &Validation, draw: impl Fn(&[Vec<String>]) -> String) -> String {
+pub fn scores(validation: &Validation, draw: impl FnOnce(&[Vec<String>]) -> String) -> String {
     let Validation { held_out, physical_machines, cpu_models, profiles, methods, floor, .. } = validation;
     let of_models = format!("{} of {}", count(*physical_machines, "physical machine"), count(*cpu_models, "CPU model"));
     let data = format!("{of_models} in {}", count(*profiles, "profile"));

@@ -168,7 +168,14 @@ impl Machine {
                         .collect(),
                     error: None,
                 });
-                points.push(point(scenario, load, timings.collect()));
+                points.push(Point {
+                    scenario: scenario.to_owned(),
+                    load,
+                    pairs: load.pairs as u64,
+                    fingerprint: "0".repeat(16),
+                    timings: timings.collect(),
+                    ..Point::default()
+                });
                 for (a, ns) in ns.iter().enumerate() {
                     let ratio = ns / best;
                     // A GPU starts far behind and gains.
@@ -178,8 +185,16 @@ impl Machine {
                 }
             }
         }
+        let provenance = Provenance {
+            version: "test".to_owned(),
+            date: "2000-01-01".to_owned(),
+            command: "test data, not a measurement".to_owned(),
+            seed: 1,
+            optimised: true,
+            ..Provenance::default()
+        };
         let algorithms = ids.into_iter().map(|id| Timed::new(id, 1)).collect();
-        Report { label: Label::RealFull, provenance: provenance(), hardware, algorithms, points, remarks: Vec::new() }
+        Report { label: Label::RealFull, provenance, hardware, algorithms, points, remarks: Vec::new() }
     }
 }
 
@@ -205,28 +220,6 @@ fn measured((id, value): (impl AsRef<str>, f64)) -> Parameter {
     Parameter::measured(id, value, "test")
 }
 
-fn provenance() -> Provenance {
-    Provenance {
-        version: "test".to_owned(),
-        date: "2000-01-01".to_owned(),
-        command: "test data, not a measurement".to_owned(),
-        seed: 1,
-        optimised: true,
-        ..Provenance::default()
-    }
-}
-
-fn point(scenario: &str, load: Load, timings: Vec<Timing>) -> Point {
-    Point {
-        scenario: scenario.to_owned(),
-        load,
-        pairs: load.pairs as u64,
-        fingerprint: "0".repeat(16),
-        timings,
-        ..Point::default()
-    }
-}
-
 /// Loads like those of a constant density that moves little, and of clusters of growing density that move less and
 /// less.
 pub(crate) fn load(scenario: &str, n: f64) -> Load {
@@ -240,12 +233,8 @@ pub(crate) fn load(scenario: &str, n: f64) -> Load {
 fn method(name: &str, backend: BackendClass, terms: &[(Term, Scale, f64)]) -> MethodModel {
     let mut method = MethodModel::new(name, backend, 1);
     method.max_threads = 16;
-    method.terms = of(terms);
+    method.terms = terms.iter().map(|&(term, scale, unit)| ModelTerm { term, scale, unit }).collect();
     method
-}
-
-fn of(terms: &[(Term, Scale, f64)]) -> Vec<ModelTerm> {
-    terms.iter().map(|&(term, scale, unit)| ModelTerm { term, scale, unit }).collect()
 }
 
 /// The costs on GPUs that the reports are made from: those that are counted, each dearer than the hardware parameters
@@ -269,15 +258,12 @@ pub(crate) fn gpu_truth() -> Vec<MethodModel> {
     vec![truth("brute", 12.0), truth("sap", 15.0), truth("grid-sap", 300.0)]
 }
 
-/// How the helpers of every method are called.
-pub(crate) const HELPERS: HelpersModel = HelpersModel::new(400.0, 0.35, 0.1, 0);
-
 /// The costs on the CPU that the reports are made from.
 pub(crate) fn truth() -> Vec<MethodModel> {
     use {Scale::*, Term::*};
     let method = |name: &str, terms: &[(Term, Scale, f64)]| {
         let mut method = method(name, BackendClass::Cpu, terms);
-        method.helpers = Some(HELPERS);
+        method.helpers = Some(HelpersModel::new(400.0, 0.35, 0.1, 0));
         method
     };
     let sorted = |call, tests| {

@@ -17,15 +17,21 @@ pub fn columns(rows: &[Vec<String>]) -> String {
     text
 }
 
-/// Each of some values once, in the order of the first.
+/// Returns each of some values once, in the order of the first.
 pub fn once<T: PartialEq>(values: impl IntoIterator<Item = T>) -> Vec<T> {
     let mut known = Vec::new();
     for value in values {
-        if !known.contains(&value) {
-            known.push(value);
-        }
+        position_or_push(&mut known, value);
     }
     known
+}
+
+/// Returns the position of a value in a list, and adds it at the end if it is missing.
+pub(crate) fn position_or_push<T: PartialEq>(list: &mut Vec<T>, value: T) -> usize {
+    list.iter().position(|known| *known == value).unwrap_or_else(|| {
+        list.push(value);
+        list.len() - 1
+    })
 }
 
 /// A number of things, with the plural of their name but for one.

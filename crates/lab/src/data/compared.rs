@@ -35,16 +35,11 @@ pub(crate) fn is_real(gpu: &GpuHardware) -> bool {
     gpu.gpu.kind != GpuKind::Software
 }
 
-/// Returns the first GPU that is no software adapter.
-fn first_real_gpu(hardware: &Hardware) -> Option<&GpuHardware> {
-    hardware.gpus.iter().find(|g| is_real(g))
-}
-
 /// Returns a parameter by its name in the ranges of a model. A parameter of GPUs is that of the first real one, which
 /// is a discrete GPU if the machine has any.
 pub fn figure(hardware: &Hardware, name: &str) -> Option<f64> {
     match name.strip_prefix(GPU_PREFIX) {
-        Some(name) => first_real_gpu(hardware)?.value_named(name),
+        Some(name) => hardware.gpus.iter().find(|g| is_real(g))?.value_named(name),
         None => hardware.value_named(name),
     }
 }

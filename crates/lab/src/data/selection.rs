@@ -62,7 +62,11 @@ impl Selection {
     /// Returns the profiles with the newest revision of each method only, and what was left out and why.
     pub fn finish(mut self) -> (Vec<Profile>, Vec<String>) {
         self.keep_apart();
-        let newest = newest_revisions(&self.profiles);
+        let mut newest: BTreeMap<MethodKey, u32> = BTreeMap::new();
+        for timed in self.profiles.iter().flat_map(|p| &p.algorithms) {
+            let known = newest.entry(method_key(&timed.id)).or_default();
+            *known = timed.revision.max(*known);
+        }
         let newest_of = |id: &AlgorithmId| newest.get(&method_key(id)).copied().unwrap_or(0);
         for profile in &mut self.profiles {
             let stale = profile.algorithms.iter().filter(|t| t.revision < newest_of(&t.id));
@@ -116,16 +120,6 @@ fn refusal(report: &Report) -> Option<String> {
 
 pub(crate) fn method_key(id: &AlgorithmId) -> MethodKey {
     (id.backend().class(), id.method().to_owned())
-}
-
-/// Returns the newest revision of each method on each class of processor.
-fn newest_revisions(profiles: &[Profile]) -> BTreeMap<MethodKey, u32> {
-    let mut newest = BTreeMap::new();
-    for timed in profiles.iter().flat_map(|p| &p.algorithms) {
-        let known = newest.entry(method_key(&timed.id)).or_insert(timed.revision);
-        *known = timed.revision.max(*known);
-    }
-    newest
 }
 
 #[cfg(test)]

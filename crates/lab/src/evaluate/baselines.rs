@@ -26,7 +26,7 @@ pub(super) fn single_best<'a>(training: &[(&Profile, &[f64])], available: &[Algo
     };
     // Where there is one thread, it is all threads too.
     let known = roles(available).into_iter().flat_map(|(role, _)| [Role { all: true, ..role.clone() }, role]);
-    let mut candidates: Vec<Role> = known.collect();
+    let mut candidates = Vec::from_iter(known);
     candidates.sort();
     let best = candidates.iter().filter_map(|role| Some((regret(role)?, role))).min_by(|a, b| a.0.total_cmp(&b.0));
     let chosen = best.and_then(|(_, role)| role.among(available.iter()).cloned());
@@ -74,20 +74,21 @@ fn by_tuning(tuning: Tuning, available: &[AlgorithmId]) -> Strategy<'_> {
 pub(super) fn of_another(costs: &[AlgorithmCost], available: &[AlgorithmId]) -> Vec<AlgorithmCost> {
     let theirs: Vec<AlgorithmId> = costs.iter().map(|c| c.algorithm.clone()).collect();
     let whole = roles(&theirs).into_iter().filter(|(role, _)| role.all);
-    let whole: Vec<(&AlgorithmCost, AlgorithmId)> = whole
-        .filter_map(|(role, id)| {
-            let own = role.among(available.iter()).filter(|own| own.backend().width() > 1)?;
-            Some((costs.iter().find(|c| c.algorithm == id)?, own.clone()))
-        })
-        .collect();
+    let counterpart = |(role, id): (Role, AlgorithmId)| {
+        let own = role.among(available.iter()).filter(|own| own.backend().width() > 1)?;
+        Some((costs.iter().find(|c| c.algorithm == id)?, own))
+    };
+    let whole: Vec<(&AlgorithmCost, &AlgorithmId)> = whole.filter_map(counterpart).collect();
     let same = costs.iter().filter(|c| {
-        let taken = whole.iter().any(|(known, own)| known.algorithm == c.algorithm || *own == c.algorithm);
+        let taken = whole.iter().any(|(known, own)| known.algorithm == c.algorithm || **own == c.algorithm);
         !taken && available.contains(&c.algorithm)
     });
-    let same: Vec<(&AlgorithmCost, AlgorithmId)> = same.map(|c| (c, c.algorithm.clone())).collect();
-    let named =
-        |(c, id): (&AlgorithmCost, AlgorithmId)| AlgorithmCost::new(id, c.revision, c.curve.clone(), c.spread_ln);
-    same.into_iter().chain(whole).map(named).collect()
+    same.cloned().chain(whole.iter().map(|(known, own)| renamed(known, own))).collect()
+}
+
+/// Returns a cost under the name of another algorithm.
+pub(super) fn renamed(cost: &AlgorithmCost, id: &AlgorithmId) -> AlgorithmCost {
+    AlgorithmCost::new(id.clone(), cost.revision, cost.curve.clone(), cost.spread_ln)
 }
 
 /// Returns the available algorithm of the same method and class of processor whose number of threads or GPUs is

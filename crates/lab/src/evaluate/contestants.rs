@@ -173,22 +173,6 @@ impl Fitted<'_> {
         }
     }
 
-    fn ours<'b>(
-        &'b self,
-        profile: &'b Profile,
-        ours: Option<&'b Ours>,
-        available: &'b [AlgorithmId],
-    ) -> [Contestant<'b>; 5] {
-        let always: Vec<(&Profile, &[f64])> = self.always.iter().map(|(p, means)| (*p, &means[..])).collect();
-        [
-            by(OURS, ours.map(|o| Cow::Borrowed(&o.whole[..])), available),
-            alone(RUNNING, running(ours, available)),
-            by(PHYSICS, ours.map(|o| Cow::Borrowed(&o.physics[..])), available),
-            alone(FOREST, self.forests.chooser(&profile.hardware, available)),
-            alone(SINGLE_BEST, baselines::single_best(&always, available)),
-        ]
-    }
-
     /// Returns the strategies for a held-out profile, fewer if a scenario is held out too.
     ///
     /// # Errors
@@ -201,10 +185,19 @@ impl Fitted<'_> {
         available: &'b [AlgorithmId],
     ) -> Result<Vec<Contestant<'b>>> {
         let (profile, seen) = (&data.profiles[held], self.seen);
+        let always: Vec<(&Profile, &[f64])> = self.always.iter().map(|(p, means)| (*p, &means[..])).collect();
         let nearest = baselines::nearest(&self.likeness, &data.likeness[held]);
         let nearest = nearest.map(|k| baselines::of_another(seen.costs(self.known[k]), available));
-        let mut all = Vec::from(self.ours(profile, ours, available));
-        all.push(by(NEAREST, nearest.map(Cow::Owned), available));
+        let whole = ours.map(|o| &o.whole[..]).unwrap_or_default();
+        let physics = ours.map(|o| &o.physics[..]).unwrap_or_default();
+        let mut all = vec![
+            by(OURS, Cow::Borrowed(whole), available),
+            alone(RUNNING, by_costs_of_running(whole.to_vec(), available)),
+            by(PHYSICS, Cow::Borrowed(physics), available),
+            alone(FOREST, self.forests.chooser(&profile.hardware, available)),
+            alone(SINGLE_BEST, baselines::single_best(&always, available)),
+            by(NEAREST, Cow::Owned(nearest.unwrap_or_default()), available),
+        ];
         if seen.without.is_none() {
             let crossed: Vec<(&Profile, &[RoleOutcome])> =
                 self.known.iter().map(|&k| (&data.profiles[k], &data.outcomes[k][..])).collect();
@@ -215,7 +208,7 @@ impl Fitted<'_> {
             ]);
         }
         // Only the scenario is held out from it, not its own machine. Crossovers are measured by its costs.
-        all.push(Contestant { costs: None, ..by(FULL_SWEEP, Some(Cow::Borrowed(seen.costs(held))), available) });
+        all.push(Contestant { costs: None, ..by(FULL_SWEEP, Cow::Borrowed(seen.costs(held)), available) });
         Ok(all)
     }
 }
@@ -223,17 +216,9 @@ impl Fitted<'_> {
 /// Costs that a model keeps, or that were made for one choice.
 type Costs<'a> = Cow<'a, [AlgorithmCost]>;
 
-/// Chooses the cheapest by costs, or nothing, which counts as the worst, without any.
-fn by<'a>(name: &'static str, costs: Option<Costs<'a>>, available: &'a [AlgorithmId]) -> Contestant<'a> {
-    let costs = costs.unwrap_or_default();
-    let choose: Strategy<'_> = if costs.is_empty() { Box::new(|_| None) } else { by_costs(costs.to_vec(), available) };
-    Contestant { name, choose, costs: Some(costs) }
-}
-
-/// Chooses the cheapest by our costs among what a program runs.
-fn running<'a>(ours: Option<&Ours>, available: &'a [AlgorithmId]) -> Strategy<'a> {
-    let costs = ours.map(|o| o.whole.clone()).unwrap_or_default();
-    if costs.is_empty() { Box::new(|_| None) } else { by_costs_of_running(costs, available) }
+/// Chooses the cheapest by costs. Without any it chooses nothing, which counts as the worst choice.
+fn by<'a>(name: &'static str, costs: Costs<'a>, available: &'a [AlgorithmId]) -> Contestant<'a> {
+    Contestant { name, choose: by_costs(costs.to_vec(), available), costs: Some(costs) }
 }
 
 /// A strategy that is not judged by costs.

@@ -1,6 +1,6 @@
 //! How far predicted crossovers lie from measured ones.
 
-use super::baselines::closest;
+use super::baselines::{closest, renamed};
 use crate::data::Profile;
 use crate::fit::{measured_slice, slice_tuning};
 use sapwise::algorithm::Load;
@@ -51,9 +51,8 @@ impl MeasuredCrossovers {
         let ids: Vec<AlgorithmId> = costs.iter().map(|c| c.algorithm.clone()).collect();
         let cost = |id: &AlgorithmId| {
             let found = closest(id, &ids)?;
-            let cost = costs.iter().find(|c| c.algorithm == found)?;
             // Under its own name, since one cost may stand in for both sides.
-            Some(AlgorithmCost::new(id.clone(), cost.revision, cost.curve.clone(), cost.spread_ln))
+            costs.iter().find(|c| c.algorithm == found).map(|cost| renamed(cost, id))
         };
         Some(self.compared(crossover, cost(&crossover.below)?, cost(&crossover.above)?))
     }

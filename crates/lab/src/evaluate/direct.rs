@@ -10,7 +10,7 @@ use anyhow::{Context, Result};
 use linfa::DatasetBase;
 use linfa::traits::Fit;
 use linfa_linear::LinearRegression;
-use ndarray::{Array1, Array2, Axis};
+use ndarray::{Array1, Array2};
 use sapwise::AlgorithmId;
 use sapwise::algorithm::BackendClass;
 use sapwise_tune::Hardware;
@@ -163,50 +163,27 @@ fn estimate(names: &[&str], machines: &[&Hardware], values: &[f64], hardware: &H
     let table = Array2::from_shape_fn((machines.len(), names.len()), |(k, j)| {
         logarithm(machines[k], names[j]).unwrap_or_default()
     });
-    Ok(Line::least_squares(&table, values)?.at(&row(hardware)))
+    regressed(&table, values, &row(hardware))
 }
 
-/// A fitted linear function of a row of numbers.
-#[derive(Debug, Clone)]
-struct Line {
-    columns: Columns,
-    /// The value at the mean of every column.
-    intercept: f64,
-    /// One for each kept column, against its standardised numbers.
-    slopes: Vec<f64>,
-}
-
-impl Line {
-    /// Fits ordinary least squares to a table of shape (rows, columns); the mean when there are not more rows than
-    /// coefficients.
-    ///
-    /// # Errors
-    /// When linfa refuses the fit.
-    fn least_squares(table: &Array2<f64>, values: &[f64]) -> Result<Self> {
-        let columns = Columns::new(table, &vec![1.0; values.len()]);
-        if values.len() <= columns.kept.len() + 1 {
-            return Ok(Self::mean(table, values));
-        }
-        let columns = columns.without_lone_rows();
-        if columns.kept.is_empty() {
-            return Ok(Self::mean(table, values));
-        }
-        let data = DatasetBase::new(columns.values.clone(), Array1::from(values.to_vec()));
-        let fitted = LinearRegression::new().fit(&data).context("the direct regression of crossovers failed")?;
-        Ok(Self { columns, intercept: fitted.intercept(), slopes: fitted.params().to_vec() })
+/// Fits ordinary least squares to a table of shape (rows, columns), and evaluates the line at a row; the mean when there
+/// are not more rows than coefficients.
+///
+/// # Errors
+/// When linfa refuses the fit.
+fn regressed(table: &Array2<f64>, values: &[f64], row: &[f64]) -> Result<f64> {
+    let columns = Columns::new(table, &vec![1.0; values.len()]);
+    if values.len() <= columns.kept.len() + 1 {
+        return Ok(mean(values));
     }
-
-    fn mean(table: &Array2<f64>, values: &[f64]) -> Self {
-        let columns = Columns::new(&table.select(Axis(1), &[]), &vec![1.0; values.len()]);
-        Self { columns, intercept: mean(values), slopes: Vec::new() }
+    let c = columns.without_lone_rows();
+    if c.kept.is_empty() {
+        return Ok(mean(values));
     }
-
-    /// Returns the value at a row with as many numbers as the table has columns.
-    fn at(&self, row: &[f64]) -> f64 {
-        let c = &self.columns;
-        let term = |j: usize| self.slopes[j] * (row[c.kept[j]] - c.centres[j]) / c.scales[j];
-        self.intercept + (0..self.slopes.len()).map(term).sum::<f64>()
-    }
+    let data = DatasetBase::new(c.values.clone(), Array1::from(values.to_vec()));
+    let fitted = LinearRegression::new().fit(&data).context("the direct regression of crossovers failed")?;
+    let term = |j: usize| fitted.params()[j] * (row[c.kept[j]] - c.centres[j]) / c.scales[j];
+    Ok(fitted.intercept() + (0..c.kept.len()).map(term).sum::<f64>())
 }
 
 #[cfg(test)]
@@ -248,7 +225,8 @@ mod tests {
         let mut random = Random::named(23, &[]);
         let table = Array2::from_shape_fn((9, 2), |(k, j)| if j == 0 { random.normal() } else { f64::from(k == 8) });
         let values: Vec<f64> = (0..9).map(|k| 5.0 + table[[k, 0]] + if k == 8 { 4.0 } else { 0.0 }).collect();
-        assert_eq!(Line::least_squares(&table, &values).unwrap().columns.kept, [0]);
+        let [same, other] = [0.0, 1.0].map(|lanes| regressed(&table, &values, &[0.5, lanes]).unwrap());
+        assert_eq!(same, other);
     }
 
     #[test]
@@ -259,10 +237,9 @@ mod tests {
             table.rows().into_iter().map(|r| 2.0 + 0.3 * r[0] - 5.0 * r[1] + 0.1 * random.normal()).collect();
         let columns = Columns::new(&table, &[1.0; 30]);
         let data = DatasetBase::new(columns.values.clone(), Array1::from(values.clone()));
-        let line = Line::least_squares(&table, &values).unwrap();
         let linfa = LinearRegression::new().fit(&data).unwrap().predict(&columns.values);
         for k in 0..30 {
-            let own = line.at(&table.row(k).to_vec());
+            let own = regressed(&table, &values, &table.row(k).to_vec()).unwrap();
             assert!((own - linfa[k]).abs() < 1e-9, "{own} {}", linfa[k]);
         }
     }

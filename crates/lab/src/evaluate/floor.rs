@@ -32,11 +32,12 @@ pub(super) fn floor<'a>(
         (cells, table(on).regret(&profiles[on], &by_costs(costs(from).to_vec(), &available)))
     };
     let regrets: Vec<(Regret, Regret)> = pairs.par_iter().map(judged).collect();
-    let part = |k: usize, of: fn(&(Regret, Regret)) -> &Regret| {
-        let profile = &profiles[pairs[k].1];
-        Part { machine: profile.machine(), several_threads: profile.has_threads(), regret: of(&regrets[k]) }
+    let mean = |of: fn(&(Regret, Regret)) -> &Regret| {
+        let part = |(&(_, on), both): (&(usize, usize), _)| {
+            let (machine, several_threads) = (profiles[on].machine(), profiles[on].has_threads());
+            Part { machine, several_threads, regret: of(both) }
+        };
+        split(&pairs.iter().zip(&regrets).map(part).collect::<Vec<_>>())
     };
-    let cells: Vec<Part<'_>> = (0..pairs.len()).map(|k| part(k, |r| &r.0)).collect();
-    let sweeps: Vec<Part<'_>> = (0..pairs.len()).map(|k| part(k, |r| &r.1)).collect();
-    Some(Floor { pairs: pairs.len() / 2, cells: split(&cells)?, full_sweep: split(&sweeps)? })
+    Some(Floor { pairs: pairs.len() / 2, cells: mean(|r| &r.0)?, full_sweep: mean(|r| &r.1)? })
 }

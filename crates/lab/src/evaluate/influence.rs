@@ -1,5 +1,6 @@
 //! The influence of hardware parameters on crossovers, by a model and by the data.
 
+use super::baselines::renamed;
 use super::crossovers::MeasuredCrossovers;
 use crate::data::{COMPARED, COMPARED_OF_GPUS, Profile, figure};
 use crate::fit::measured_costs;
@@ -127,7 +128,7 @@ fn costs(profile: &Profile, model: &Model, hardware: Hardware, threads: u32) -> 
     // Under the names that were timed.
     let named = |e: &Entry| {
         let cost = costs.iter().find(|c| run(&e.id).as_ref() == Some(&c.algorithm))?;
-        Some(AlgorithmCost::new(e.id.clone(), cost.revision, cost.curve.clone(), cost.spread_ln))
+        Some(renamed(cost, &e.id))
     };
     Some(timed.iter().filter_map(named).collect())
 }

@@ -19,31 +19,26 @@ impl Partition {
     /// Makes a fold of each physical machine with all its profiles; of one machine alone, of each SIMD level and each
     /// thread count; without such restrictions, of each profile.
     pub fn new(profiles: &[Profile]) -> Self {
-        let folds = grouped(profiles, |p| p.machine().to_owned());
-        if folds.len() < 2 {
-            return Self::of_restrictions(profiles);
+        let of = |held_out: &str, by_machine, folds| Self { held_out: held_out.to_owned(), by_machine, folds };
+        let machines = grouped(profiles, Profile::machine);
+        if machines.len() > 1 {
+            return of("physical machine", true, machines);
         }
-        Self { held_out: "physical machine".to_owned(), by_machine: true, folds }
-    }
-
-    fn of_restrictions(profiles: &[Profile]) -> Self {
-        let level = |p: &Profile, id: ParameterId| p.hardware.value(id).map_or(0, |v| v as u64);
         let by = |id: ParameterId| {
-            let folds = grouped(profiles, |p| format!("{:020}", level(p, id)));
+            let folds = grouped(profiles, |p| p.hardware.value(id).map_or(0, |v| v as u64));
             if folds.len() > 1 { folds } else { Vec::new() }
         };
-        let folds = [by(ParameterId::SimdLanes), by(ParameterId::UsableCores)].concat();
-        if folds.is_empty() {
-            let folds = (0..profiles.len()).map(|k| vec![k]).collect();
-            return Self { held_out: "profile".to_owned(), by_machine: false, folds };
+        let restrictions = [by(ParameterId::SimdLanes), by(ParameterId::UsableCores)].concat();
+        if !restrictions.is_empty() {
+            return of("SIMD level and thread count", false, restrictions);
         }
-        Self { held_out: "SIMD level and thread count".to_owned(), by_machine: false, folds }
+        of("profile", false, (0..profiles.len()).map(|k| vec![k]).collect())
     }
 }
 
 /// Returns the positions of the profiles that share a key, in the order of the keys.
-fn grouped(profiles: &[Profile], key: impl Fn(&Profile) -> String) -> Vec<Vec<usize>> {
-    let mut groups: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+fn grouped<'a, K: Ord>(profiles: &'a [Profile], key: impl Fn(&'a Profile) -> K) -> Vec<Vec<usize>> {
+    let mut groups: BTreeMap<K, Vec<usize>> = BTreeMap::new();
     for (k, profile) in profiles.iter().enumerate() {
         groups.entry(key(profile)).or_default().push(k);
     }

@@ -14,36 +14,24 @@ pub(super) struct Role {
 
 /// Returns the roles of algorithms on a machine, in order. Of several single GPUs the first one counts.
 pub(super) fn roles(ids: &[AlgorithmId]) -> Vec<(Role, AlgorithmId)> {
-    let mut roles: Vec<(Role, AlgorithmId)> = Vec::new();
-    for id in ids {
-        let width = id.backend().width();
-        let role = Role { class: id.backend().class(), method: id.method().to_owned(), all: width > 1 };
-        if (width == 1 || role.widest(ids) == Some(width)) && roles.iter().all(|r| r.0 != role) {
-            roles.push((role, id.clone()));
-        }
-    }
+    let role = |id: &AlgorithmId| {
+        let backend = id.backend();
+        Role { class: backend.class(), method: id.method().to_owned(), all: backend.width() > 1 }
+    };
+    let mut roles: Vec<(Role, AlgorithmId)> = ids.iter().map(|id| (role(id), id.clone())).collect();
+    roles.retain(|(role, id)| role.among(ids.iter()) == Some(id));
     roles.sort();
+    roles.dedup();
     roles
 }
 
 impl Role {
     /// Returns the algorithm that has this role among those of a machine. With one thread, or one GPU, that is all.
     pub(super) fn among<'a>(&self, ids: impl Iterator<Item = &'a AlgorithmId> + Clone) -> Option<&'a AlgorithmId> {
-        let alike = || ids.clone().filter(|id| self.is_of(id));
-        if !self.all {
-            return alike().find(|id| id.backend().width() == 1);
-        }
+        let alike = || ids.clone().filter(|id| id.method() == self.method && id.backend().class() == self.class);
         let most = alike().map(|id| id.backend().width()).max();
-        alike().find(|id| Some(id.backend().width()) == most)
-    }
-
-    /// Returns the most threads, or GPUs, that algorithms of its method run on.
-    fn widest(&self, ids: &[AlgorithmId]) -> Option<u32> {
-        ids.iter().filter(|id| self.is_of(id)).map(|id| id.backend().width()).max()
-    }
-
-    fn is_of(&self, id: &AlgorithmId) -> bool {
-        id.method() == self.method && id.backend().class() == self.class
+        let wanted = if self.all { most } else { Some(1) };
+        alike().find(|id| Some(id.backend().width()) == wanted)
     }
 }
 

@@ -2,7 +2,6 @@
 
 use super::held_out::UnitRegrets;
 use super::regret_table::Regret;
-use crate::data::Profile;
 use crate::spread::range;
 use crate::text::once;
 use crate::training::{MethodScore, Regrets, Split};
@@ -38,19 +37,6 @@ pub(super) struct Judged {
 }
 
 impl Judged {
-    pub(super) fn new(name: &'static str, profile: &Profile, regret: Regret, crossings: Option<Vec<f64>>) -> Self {
-        Self {
-            name,
-            file: profile.file.clone(),
-            machine: profile.machine().to_owned(),
-            several_threads: profile.has_threads(),
-            regret,
-            unseen: None,
-            by_means: None,
-            crossings,
-        }
-    }
-
     /// Returns what one regret is of: the machine, or the profile if there is one machine only.
     pub(super) fn unit(&self, by_machine: bool) -> &str {
         if by_machine { &self.machine } else { &self.file }

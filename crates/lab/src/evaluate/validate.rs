@@ -146,13 +146,17 @@ fn held_out(data: &Material<'_>, seen: &Seen<'_>, fitted: &Fitted<'_>, judged: &
             }
         }
         let means = RegretTable::by_means(profile);
-        let regret = |contestant: Contestant<'_>| {
-            let regret = table.regret(profile, &contestant.choose);
-            let by_means = Some(means.regret(profile, &contestant.choose));
-            let crossings = contestant.costs.map(|costs| measured.iter().flat_map(|m| m.errors(&costs)).collect());
-            Judged { by_means, ..Judged::new(contestant.name, profile, regret, crossings) }
+        let judge = |contestant: Contestant<'_>| Judged {
+            name: contestant.name,
+            file: profile.file.clone(),
+            machine: profile.machine().to_owned(),
+            several_threads: profile.has_threads(),
+            regret: table.regret(profile, &contestant.choose),
+            unseen: None,
+            by_means: Some(means.regret(profile, &contestant.choose)),
+            crossings: contestant.costs.map(|costs| measured.iter().flat_map(|m| m.errors(&costs)).collect()),
         };
-        found.judged.extend(contestants.into_iter().map(regret));
+        found.judged.extend(contestants.into_iter().map(judge));
         found.errors.push(Errors::of(profile, costs.unwrap_or_default()));
     }
     Ok(found)

@@ -9,6 +9,7 @@ use crate::data::Profile;
 use crate::fit::load_residual::{Basis, NOISE_LN, noise_ln, places};
 use crate::fit::rows::Row;
 use crate::fit::terms::is_incremental;
+use crate::text::position_or_push;
 use linfa_linalg::cholesky::SolveC;
 use ndarray::{Array1, Array2, ArrayView1, Axis, s};
 use sapwise::algorithm::BackendClass;
@@ -131,12 +132,7 @@ struct Parts<'a> {
 impl<'a> Parts<'a> {
     fn new(costs: &'a [AlgorithmCost], curve: usize) -> Self {
         let mut shared: Vec<Part<'a>> = Vec::new();
-        let mut position = |part| {
-            shared.iter().position(|known| *known == part).unwrap_or_else(|| {
-                shared.push(part);
-                shared.len() - 1
-            })
-        };
+        let mut position = |part| position_or_push(&mut shared, part);
         let of_cost = costs.iter().map(|cost| Part::of(cost).map(&mut position).collect()).collect();
         Self { shared, of_cost, curve }
     }

@@ -3,6 +3,7 @@
 
 use crate::data::Profile;
 use crate::fit::rows::Row;
+use crate::text::position_or_push;
 use anyhow::{Context, Result};
 use linfa_linalg::cholesky::Cholesky;
 use ndarray::{Array1, Array2, Axis, s};
@@ -182,15 +183,12 @@ impl Groups {
         for own in measured.chunk_by(|&a, &b| source(a) == source(b)) {
             let (first, at) = &rows[own[0]];
             let group = (at.iter().map(|x| (x * PER_LENGTH).round() / PER_LENGTH).collect(), machines[first.profile]);
-            let known = groups.iter().position(|known| *known == group);
+            let group = position_or_push(&mut groups, group);
             let spots: Vec<usize> = own.iter().map(|&k| rows[k].0.spot as usize).collect();
             let features = features[first.profile][usize::from(by_motion)].select(Axis(0), &spots);
             let precision = Array1::from_iter(own.iter().map(|&k| noise_ln(rows[k].0.behind).powi(-2)));
             let block = (&features * &precision.view().insert_axis(Axis(1))).t().dot(&features);
-            cells.push(Cell { first: own[0], group: known.unwrap_or(groups.len()), features, precision, block });
-            if known.is_none() {
-                groups.push(group);
-            }
+            cells.push(Cell { first: own[0], group, features, precision, block });
         }
         Self { by_motion, groups, cells }
     }

@@ -1,7 +1,7 @@
 //! Least squares with coefficients that are not negative.
 
 use linfa_linalg::qr::QRInto;
-use ndarray::{Array1, Array2, ArrayView1, Axis, concatenate, s};
+use ndarray::{Array1, Array2, Axis, concatenate, s};
 
 /// Length outside the span of the active columns that a column of length one needs to join them.
 const INDEPENDENT: f64 = 1e-7;
@@ -119,7 +119,7 @@ fn solve(a: &Array2<f64>, b: &Array1<f64>, active: &[usize]) -> Option<Vec<f64>>
                 column.scaled_add(-share, q);
             }
         }
-        let length = length(column.view());
+        let length = column.dot(&column).sqrt();
         if length < INDEPENDENT {
             return None;
         }
@@ -132,10 +132,6 @@ fn solve(a: &Array2<f64>, b: &Array1<f64>, active: &[usize]) -> Option<Vec<f64>>
         z[j] = (base[j].dot(b) - known) / r[[j, j]];
     }
     Some(z)
-}
-
-fn length(v: ArrayView1<'_, f64>) -> f64 {
-    v.dot(&v).sqrt()
 }
 
 #[cfg(test)]

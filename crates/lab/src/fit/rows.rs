@@ -55,12 +55,9 @@ pub fn rows(profile: &Profile, position: usize, without: Option<&str>) -> Vec<Ro
         // A GPU has a large fixed cost: it starts far behind and gains. One that left while it gained, because time
         // ran out, may be ahead at larger sizes.
         ratios.retain(|_, course| !(on_gpu && gains(course)));
-        let last: BTreeMap<&str, (u32, f64)> = ratios
-            .iter()
-            .filter_map(|(s, course)| course.last_key_value().map(|(&n, &ratio)| (*s, (n, ratio))))
-            .collect();
         for (k, spot) in profile.points.iter().enumerate().filter(held) {
-            let Some(&(objects, behind)) = last.get(spot.scenario.as_str()) else { continue };
+            let course = ratios.get(spot.scenario.as_str());
+            let Some((&objects, behind)) = course.and_then(BTreeMap::last_key_value) else { continue };
             if let Some(best) = bests[k].filter(|_| spot.load.objects > objects) {
                 rows.push(row((k, spot), best, (behind / 2.0).max(LEFT_BEHIND), true));
             }

@@ -87,11 +87,11 @@ fn cpus(reference: &Profile, others: &[&Profile]) -> Ratios {
     };
     let mut rows: Vec<(String, Vec<Option<f64>>)> = COMPARED.into_iter().map(parameter).collect();
     let faster: Vec<_> = others.iter().map(|p| speed_ups(reference, p)).collect();
-    for id in
-        reference.available().into_iter().filter(|id| id.threads() == 1 && !faster.iter().all(|f| !f.contains_key(id)))
-    {
-        let ratios = faster.iter().map(|f| f.get(&id).copied()).collect();
-        rows.push((format!("speed of {}", id.method()), ratios));
+    for id in reference.available().into_iter().filter(|id| id.threads() == 1) {
+        let ratios: Vec<Option<f64>> = faster.iter().map(|f| f.get(&id).copied()).collect();
+        if ratios.iter().any(Option::is_some) {
+            rows.push((format!("speed of {}", id.method()), ratios));
+        }
     }
     Ratios {
         title: format!("Parameters and speed over those of {}", title(reference)),

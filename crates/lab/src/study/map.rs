@@ -3,6 +3,7 @@
 use super::{Material, Page, title};
 use crate::data::Profile;
 use crate::figures::{Cell, FieldMap, MapPanel};
+use crate::text::position_or_push;
 use crate::train::without;
 use anyhow::{Result, ensure};
 use rayon::prelude::*;
@@ -73,12 +74,7 @@ fn map(material: &Material, profile: &Profile) -> Result<(FieldMap, Option<Strin
     };
     let cells: Vec<_> = (0..ACROSS * UP).into_par_iter().map(cell).collect();
     let mut names: Vec<String> = Vec::new();
-    let mut place = |name: String| {
-        names.iter().position(|n| *n == name).unwrap_or_else(|| {
-            names.push(name);
-            names.len() - 1
-        })
-    };
+    let mut place = |name: String| position_or_push(&mut names, name);
     let mut fields = |costs: &[AlgorithmCost]| -> Vec<Cell> {
         let best = |load: &Load| {
             costs.iter().min_by(|a, b| a.curve.cost_ns(load).total_cmp(&b.curve.cost_ns(load))).map(|c| &c.algorithm)

@@ -201,16 +201,16 @@ fn regrets(material: &Material, page: &mut Page) {
     let Some(validation) = validation else {
         return page.lacks("Nothing was held out: it takes two reports with timings.");
     };
-    let rows = std::cell::RefCell::new(Vec::new());
+    let mut rows = Vec::new();
     let what = model_card::scores(validation, |table| {
-        *rows.borrow_mut() = table.to_vec();
+        rows = table.to_vec();
         String::new()
     });
     page.text(
         "Regret is the time of what is chosen over that of the best choice, less one. In parentheses it is weighted by \
          the numbers of objects that games are assumed to have, log-normal around 800.",
     );
-    page.table(what.trim(), &rows.into_inner());
+    page.table(what.trim(), &rows);
     let on_gpu = |p: &Profile| p.algorithms.iter().any(|t| t.id.backend().class() == BackendClass::Gpu);
     let with_gpu = |p: &&Profile| on_gpu(p) && p.hardware.gpus.iter().any(data::is_real);
     let hosts: BTreeSet<&str> = material.profiles.iter().filter(with_gpu).map(Profile::machine).collect();
