@@ -55,8 +55,8 @@ pub(crate) fn answers<T: DeserializeOwned>(arguments: &[&str], limit: Duration) 
     Ok((answers, ended))
 }
 
-/// Runs another `sapwise` with these arguments, which must make it [`stop_with_parent`], and these environment
-/// variables. Calls `on_wait` over and over until it ends.
+/// Runs another `sapwise` with these arguments and environment variables, and calls `on_wait` over and over until it
+/// ends. The arguments must include `--leashed`, so that it stops with this process.
 ///
 /// # Errors
 /// When the process can't be started.
@@ -134,20 +134,12 @@ fn run(
     Ok(judge(status, &complaint))
 }
 
-/// Asks this process to stop, as Ctrl-C does, when the pipe of the process that started it closes.
-pub(crate) fn stop_with_parent() {
-    std::thread::spawn(|| {
-        let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
-        interrupt::request();
-    });
-}
-
-/// Ends this process when the pipe of the process that started it closes. The first step of a part.
-pub(crate) fn end_with_parent() {
+/// Calls `act` when the pipe of the process that started this one closes.
+pub(crate) fn when_parent_ends(act: impl FnOnce() + Send + 'static) {
     std::thread::spawn(|| {
         // The parent writes nothing, so this returns at the end only.
         let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
-        std::process::exit(1);
+        act();
     });
 }
 

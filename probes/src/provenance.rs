@@ -118,31 +118,22 @@ mod tests {
 
     #[test]
     fn the_command_holds_no_path() {
-        let arguments = Probe::of(&[
-            "--quick",
-            "--out",
-            "/home/someone/r.json",
-            "--threads",
-            "1",
-            "--scenario",
-            "slab",
-            "--no-gpus",
-        ]);
+        let arguments = Probe::of("--quick --out /home/someone/r.json --threads 1 --scenario slab --no-gpus");
         assert_eq!(command(&arguments), "probe --quick --no-gpus --threads 1 --seed 1 --scenario slab");
-        assert_eq!(command(&Probe::of(&["--gpu", "0", "--gpu", "2"])), "probe --gpu 0 --gpu 2 --seed 1");
+        assert_eq!(command(&Probe::of("--gpu 0 --gpu 2")), "probe --gpu 0 --gpu 2 --seed 1");
     }
 
     #[test]
     fn contention_and_restriction_are_labelled() {
         let quiet = [point(Some(0.01)), point(None), point(Some(0.9)), point(Some(0.0))];
         let busy = [point(Some(0.3)), point(Some(0.4)), point(Some(0.0))];
-        let label = |words: &[&str], points: &[Point]| label(&Probe::of(words), points, &hardware(GpuKind::Discrete));
-        assert_eq!(label(&[], &busy), Label::RealContended);
+        let label = |words: &str, points: &[Point]| label(&Probe::of(words), points, &hardware(GpuKind::Discrete));
+        assert_eq!(label("", &busy), Label::RealContended);
         if requested_level().is_none() {
-            assert_eq!(label(&[], &quiet), Label::RealFull);
+            assert_eq!(label("", &quiet), Label::RealFull);
         }
         if usable_cores() > 1 {
-            assert_eq!(label(&["--threads", "1"], &quiet), Label::RealRestricted);
+            assert_eq!(label("--threads 1", &quiet), Label::RealRestricted);
         }
     }
 
@@ -158,9 +149,9 @@ mod tests {
         let swept = [Point { timings: vec![timing(vec![1, 2, 3])], ..point(None) }];
         let failed = [Point { timings: vec![timing(Vec::new())], ..point(None) }];
         let software = hardware(GpuKind::Software);
-        assert_eq!(label(&Probe::of(&[]), &swept, &software), Label::RealSoftwareGpu);
-        assert_ne!(label(&Probe::of(&[]), &failed, &software), Label::RealSoftwareGpu);
-        assert_ne!(label(&Probe::of(&[]), &swept, &hardware(GpuKind::Discrete)), Label::RealSoftwareGpu);
+        assert_eq!(label(&Probe::of(""), &swept, &software), Label::RealSoftwareGpu);
+        assert_ne!(label(&Probe::of(""), &failed, &software), Label::RealSoftwareGpu);
+        assert_ne!(label(&Probe::of(""), &swept, &hardware(GpuKind::Discrete)), Label::RealSoftwareGpu);
         assert_eq!(timed(&swept, Some(1), &software, &Algorithms::default())[0].id.to_string(), "brute@gpu0");
     }
 }

@@ -2,7 +2,8 @@
 
 mod common;
 
-use common::{failure, sapwise, small_report, success, tuning};
+use common::{failure, list, output, sapwise, small_report, success, tuning, write};
+use sapwise_lab::Report;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -21,19 +22,11 @@ fn report() -> Value {
     report
 }
 
-fn write(folder: &Path, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
-    let path = folder.join(name);
-    fs::write(&path, content).unwrap();
-    path
-}
-
-/// Exit status and the findings, one for each file.
-fn check(files: &[PathBuf]) -> (i32, Vec<Value>) {
-    let ended = sapwise().args(["check", "--json"]).args(files).output().unwrap();
-    let complaint = String::from_utf8_lossy(&ended.stderr).into_owned();
-    assert!(!complaint.contains("panicked"), "{complaint}");
-    let answer: Value = serde_json::from_slice(&ended.stdout).unwrap();
-    (ended.status.code().unwrap(), answer["files"].as_array().unwrap().clone())
+/// The findings, one for each file, of a check that ends with this status.
+fn check(files: &[PathBuf], status: i32) -> Vec<Value> {
+    let told = output(sapwise().args(["check", "--json"]).args(files), status);
+    let answer: Value = serde_json::from_str(&told).unwrap();
+    list(&answer["files"]).to_vec()
 }
 
 #[test]
@@ -45,8 +38,7 @@ fn sound_files_pass() {
     let told = success(sapwise().arg("check").args([&report, &tuning, &again]));
     let next = format!("Next: sapwise study {} {} --out study", report.display(), again.display());
     assert!(told.contains(&next) && told.contains("2 of 2 reports can be believed"), "{told}");
-    let (status, findings) = check(&[report, tuning]);
-    assert_eq!(status, 0, "{findings:?}");
+    let findings = check(&[report, tuning], 0);
     assert!(findings.iter().all(|f| f["sound"] == true && f["current"] == true), "{findings:?}");
     assert_eq!((&findings[0]["schema"], &findings[0]["applicable"]), (&"report/3".into(), &false.into()));
     assert_eq!((&findings[1]["schema"], &findings[1]["applicable"]), (&"tuning/3".into(), &true.into()));
@@ -63,13 +55,12 @@ fn stale_and_inapplicable_files_fail_and_say_which_algorithm() {
     let old = write(folder.path(), "old.json", old.to_string());
     let steps = [(0, "brute@cpu4096"), (9, "octree@cpu1"), (99, "grid-sap@gpu99"), (999, "sap@cpu2048")];
     let elsewhere = write(folder.path(), "elsewhere.json", tuning(&steps).to_string());
-    let (status, findings) = check(&[old, elsewhere]);
-    assert_eq!(status, 1);
+    let findings = check(&[old, elsewhere], 1);
     assert_eq!((&findings[0]["sound"], &findings[0]["current"]), (&true.into(), &false.into()));
     assert!(findings[0]["problems"].to_string().contains("brute has revision 999999"), "{findings:?}");
     assert_eq!(findings[1]["applicable"], false);
     // One line for all algorithms that want more cores.
-    assert_eq!(findings[1]["problems"].as_array().map(Vec::len), Some(3), "{findings:?}");
+    assert_eq!(list(&findings[1]["problems"]).len(), 3, "{findings:?}");
     for text in ["brute@cpu4096, sap@cpu2048", "up to 4096 threads", "octree@cpu1", "grid-sap@gpu99"] {
         assert!(findings[1]["problems"].to_string().contains(text), "{findings:?}");
     }
@@ -108,8 +99,8 @@ fn damaged_files_are_named_with_the_place_and_hide_no_others() {
     ];
     let last = path("good.json", good.as_bytes());
     let files: Vec<PathBuf> = cases.iter().map(|c| c.0.clone()).chain([last]).collect();
-    let (status, findings) = check(&files);
-    assert_eq!((status, findings.len()), (1, files.len()));
+    let findings = check(&files, 1);
+    assert_eq!(findings.len(), files.len());
     for ((file, text), finding) in cases.iter().zip(&findings) {
         let problems = finding["problems"].to_string();
         assert!(finding["sound"] == false && problems.contains(text), "{}: {text} not in {problems}", file.display());
@@ -134,8 +125,8 @@ fn train_refuses_what_is_no_report() {
 /// What is changed in a sound report, and what is said about it.
 type Case = (&'static str, Value, &'static str);
 
-/// The findings on a sound report, each with one thing changed.
-fn damaged(cases: &[Case]) -> Vec<Value> {
+/// The findings on sound reports, each with one thing changed, of a check that ends with this status.
+fn changed(cases: &[Case], status: i32) -> Vec<Value> {
     let folder = tempfile::tempdir().unwrap();
     let file = |(k, (pointer, value, _)): (usize, &Case)| {
         let mut report = report();
@@ -144,14 +135,14 @@ fn damaged(cases: &[Case]) -> Vec<Value> {
         write(folder.path(), &format!("{k}.json"), report.to_string())
     };
     let files: Vec<PathBuf> = cases.iter().enumerate().map(file).collect();
-    check(&files).1
+    check(&files, status)
 }
 
 #[test]
 fn impossible_figures_and_revealing_texts_are_problems_that_name_them() {
     let folder = tempfile::tempdir().unwrap();
-    let (status, sound) = check(&[write(folder.path(), "sound.json", report().to_string())]);
-    assert_eq!((status, &sound[0]["problems"], &sound[0]["sound"]), (0, &json!([]), &true.into()), "{sound:?}");
+    let sound = check(&[write(folder.path(), "sound.json", report().to_string())], 0);
+    assert_eq!((&sound[0]["problems"], &sound[0]["sound"]), (&json!([]), &true.into()), "{sound:?}");
     let parameter = |k: usize, key: &str| -> &'static str { format!("/hardware/parameters/{k}/{key}").leak() };
     let timing = json!({"algorithm": "brute@cpu1", "samples_ns": [100, 101], "error": null});
     let twice = json!([timing, timing]);
@@ -178,8 +169,8 @@ fn impossible_figures_and_revealing_texts_are_problems_that_name_them() {
         ("/provenance/command", "probe --out /home/me/r.json".into(), "holds the folder of a user"),
         ("/remarks", json!(["a remark", "see C:\\Users\\me"]), "holds the folder of a user"),
     ];
-    for ((pointer, value, text), finding) in cases.iter().zip(damaged(&cases)) {
-        let problems = finding["problems"].as_array().unwrap();
+    for ((pointer, value, text), finding) in cases.iter().zip(changed(&cases, 1)) {
+        let problems = list(&finding["problems"]);
         let told = problems.iter().any(|p| p.as_str().unwrap().contains(text));
         assert!(told, "{pointer} as {value}: {text:?} is not in {problems:?}");
     }
@@ -215,28 +206,22 @@ fn doubts_and_notes_leave_a_file_sound() {
         ("/points", calm, ""),
         ("/points/1/timings", rested, ""),
     ];
-    for (k, ((pointer, value, text), finding)) in cases.iter().zip(damaged(&cases)).enumerate() {
+    for (k, ((pointer, value, text), finding)) in cases.iter().zip(changed(&cases, 0)).enumerate() {
         assert_eq!(finding["problems"], json!([]), "{pointer} as {value}");
-        let list = if k < 3 { "doubts" } else { "notes" };
-        assert!(finding[list].to_string().contains(text), "{pointer} as {value}: {finding}");
-        assert_eq!(finding["doubts"].as_array().unwrap().len(), usize::from(k < 3), "{finding}");
+        let key = if k < 3 { "doubts" } else { "notes" };
+        assert!(finding[key].to_string().contains(text), "{pointer} as {value}: {finding}");
+        assert_eq!(list(&finding["doubts"]).len(), usize::from(k < 3), "{finding}");
     }
 }
 
 #[test]
 fn of_a_folder_a_table_says_which_reports_agree() {
     let folder = tempfile::tempdir().unwrap();
-    let put = |name: &str, by: u64, change: &dyn Fn(&mut Value)| {
-        let mut report = report();
-        for timing in
-            report["points"].as_array_mut().unwrap().iter_mut().flat_map(|p| p["timings"].as_array_mut().unwrap())
-        {
-            timing["samples_ns"]
-                .as_array_mut()
-                .unwrap()
-                .iter_mut()
-                .for_each(|ns| *ns = json!(ns.as_u64().unwrap() * by / 100));
-        }
+    let put = |name: &str, percent: u64, change: &dyn Fn(&mut Value)| {
+        let mut report: Report = sapwise_lab::report::read(&report().to_string()).unwrap().value;
+        let timings = report.points.iter_mut().flat_map(|p| &mut p.timings);
+        timings.flat_map(|t| &mut t.samples_ns).for_each(|ns| *ns = *ns * percent / 100);
+        let mut report = serde_json::from_str(&sapwise_lab::report::write(&report).unwrap()).unwrap();
         change(&mut report);
         write(folder.path(), name, report.to_string());
     };
@@ -246,9 +231,7 @@ fn of_a_folder_a_table_says_which_reports_agree() {
     put("cut.json", 1000, &|report| report["remarks"] = json!(["interrupted at the first point"]));
     put("elsewhere.json", 300, &|report| report["hardware"]["machine"]["physical_id"] = "00000000000000aa".into());
     write(folder.path(), "bad.json", "{");
-    let ended = sapwise().arg("check").arg(folder.path()).output().unwrap();
-    let told = String::from_utf8(ended.stdout).unwrap();
-    assert_eq!(ended.status.code(), Some(1), "{told}");
+    let told = output(sapwise().arg("check").arg(folder.path()), 1);
     let row = |name: &str| {
         let row = told.lines().find(|line| line.contains(name) && !line.contains(": "));
         row.unwrap_or_else(|| panic!("no row of {name}: {told}"))
@@ -261,10 +244,8 @@ fn of_a_folder_a_table_says_which_reports_agree() {
     };
     assert_eq!(row("full.json")[2..4], ["good", "0.66"]);
     assert_eq!(row("slow.json")[2..4], ["DOUBTFUL", "1.98"]);
-    assert_eq!(
-        (&row("cut.json")[2..], &row("elsewhere.json")[2..]),
-        (&["DOUBTFUL", "-"].map(str::to_owned)[..], &["good", "-"].map(str::to_owned)[..])
-    );
+    assert_eq!(row("cut.json")[2..], ["DOUBTFUL", "-"]);
+    assert_eq!(row("elsewhere.json")[2..], ["good", "-"]);
     assert!(row("full.json")[1] == row("slow.json")[1] && row("elsewhere.json")[1] != row("slow.json")[1], "{told}");
     for text in [
         "1.98 × the time of the other reports",
@@ -275,15 +256,10 @@ fn of_a_folder_a_table_says_which_reports_agree() {
         assert!(told.contains(text), "{text}: {told}");
     }
     assert!(!told.contains("/full.json: "), "{told}");
-    let json: Value =
-        serde_json::from_slice(&sapwise().args(["check", "--json"]).arg(folder.path()).output().unwrap().stdout)
-            .unwrap();
-    assert_eq!(json["files"].as_array().unwrap().len(), 6);
-    let slow = json["kinds"][0]["reports"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .find(|r| r["file"].as_str().unwrap().ends_with("slow.json"));
+    let json: Value = serde_json::from_str(&output(sapwise().args(["check", "--json"]).arg(folder.path()), 1)).unwrap();
+    assert_eq!(list(&json["files"]).len(), 6);
+    let reports = list(&json["kinds"][0]["reports"]);
+    let slow = reports.iter().find(|r| r["file"].as_str().unwrap().ends_with("slow.json"));
     assert_eq!(slow.unwrap()["over_others"]["timings"], 72, "{json}");
     let empty = tempfile::tempdir().unwrap();
     failure(sapwise().arg("check").arg(empty.path()), 1, &["holds no *.json file"]);
@@ -295,11 +271,9 @@ fn the_published_cards_are_sound_and_told_to_be_published() {
     let files = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path());
     let cards: Vec<PathBuf> = files.filter(|file| file.extension().is_some_and(|e| e == "json")).collect();
     assert_eq!(cards.len(), 3);
-    let (status, findings) = check(&cards);
-    assert_eq!(status, 0, "{findings:?}");
-    for finding in findings {
+    for finding in check(&cards, 0) {
         assert_eq!((&finding["sound"], &finding["applicable"]), (&true.into(), &false.into()), "{finding}");
-        let notes = finding["notes"].as_array().unwrap();
+        let notes = list(&finding["notes"]);
         assert!(notes.iter().any(|n| n.as_str().unwrap().starts_with("published parameters")), "{finding}");
         assert!(!finding.to_string().contains("measured"), "{finding}");
     }
@@ -323,8 +297,8 @@ fn keys_of_a_newer_version_are_ignored_and_told_once_a_file() {
     let newer = write(folder.path(), "newer.json", newer.to_string());
     let sentence = "newer.json is of report/3.9, which a newer version of sapwise wrote; ignored, because this version \
                     does not know it: points[].load.depth, weather";
-    let (status, findings) = check(std::slice::from_ref(&newer));
-    assert!(status == 0 && findings[0]["notes"].to_string().contains(sentence), "{findings:?}");
+    let findings = check(std::slice::from_ref(&newer), 0);
+    assert!(findings[0]["notes"].to_string().contains(sentence), "{findings:?}");
     let out = folder.path().join("tuning.json");
     let mut steps = tuning(&[(0, "brute@cpu1")]);
     steps["schema"] = "tuning/3.1".into();

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{answer, failure, sapwise, small_report};
+use common::{answer, failure, list, sapwise, small_report, write};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,9 +13,7 @@ fn report(folder: &Path, name: &str, changes: &[(&str, Value)]) -> PathBuf {
     for (pointer, value) in changes {
         *report.pointer_mut(pointer).unwrap() = value.clone();
     }
-    let path = folder.join(name);
-    fs::write(&path, report.to_string()).unwrap();
-    path
+    write(folder, name, report.to_string())
 }
 
 fn assert_keys(value: &Value, keys: &[&str]) {
@@ -29,9 +27,8 @@ fn assert_tuning(tuning: &Value, source: &str) {
     assert!(tuning.get("model").is_some());
     assert_eq!((&tuning["schema"], &tuning["source"]), (&"tuning/3".into(), &source.into()));
     assert_eq!((&tuning["scenario"], &tuning["steps"][0]["from_objects"]), (&"uniform".into(), &0.into()));
-    tuning["steps"].as_array().unwrap().iter().for_each(|step| assert_keys(step, &["from_objects", "algorithm"]));
-    let crossovers = tuning["crossovers"].as_array().unwrap();
-    for crossover in crossovers {
+    list(&tuning["steps"]).iter().for_each(|step| assert_keys(step, &["from_objects", "algorithm"]));
+    for crossover in list(&tuning["crossovers"]) {
         assert_keys(crossover, &["below", "above", "objects"]);
         // An interval is claimed if the training held out two machines or more and this one is like them.
         let extrapolated = tuning["extrapolated"] == true;
@@ -59,7 +56,7 @@ fn train_and_predict_keep_their_contracts() {
     assert_keys(&trained, &["validation", "model", "notes"]);
     let validation = &trained["validation"];
     assert_eq!((&validation["physical_machines"], &validation["profiles"]), (&2.into(), &2.into()));
-    let methods = validation["methods"].as_array().unwrap();
+    let methods = list(&validation["methods"]);
     assert!(methods.len() >= 9, "{methods:?}");
     let figures = ["name", "mean_regret", "share_over_10_percent"];
     methods.iter().for_each(|m| assert_keys(m, &figures));
@@ -120,8 +117,7 @@ fn run_refuses_tunings_and_reports_of_other_revisions() {
     let own = report(folder.path(), "own.json", &[]);
     let mut tuning = answer(sapwise().args(["predict", "--measured", "--json", "--report"]).arg(own));
     tuning["costs"][0]["revision"] = 999_999.into();
-    let stale = folder.path().join("stale.json");
-    fs::write(&stale, tuning.to_string()).unwrap();
+    let stale = write(folder.path(), "stale.json", tuning.to_string());
     for (file, name) in [(&old, "old.json"), (&stale, "stale.json")] {
         let texts = [name, "brute", "999999", "probe again"];
         failure(sapwise().args(["run", "uniform", "--tuning"]).arg(file), 1, &texts);

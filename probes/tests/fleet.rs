@@ -2,7 +2,8 @@
 
 mod common;
 
-use common::{failure, sapwise, small_report, success};
+use common::{failure, output, sapwise, small_report, success};
+use sapwise::tuning::Source;
 use sapwise_lab::report::Label;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -50,12 +51,6 @@ fn a_node_measures_once_into_a_shared_folder_and_again_what_was_cut_short() {
     failure(sapwise().args(["probe", "--hardware-only", "--out", &missing]), 1, &["there is no such folder"]);
 }
 
-/// The standard output of a command that fails.
-fn failure_text(command: &mut assert_cmd::Command) -> String {
-    let ended = command.assert().code(1);
-    String::from_utf8(ended.get_output().stdout.clone()).unwrap()
-}
-
 #[test]
 fn each_kind_of_machine_gets_a_tuning_by_its_identity() {
     let [reports, tunings] = [(), ()].map(|()| tempfile::tempdir().unwrap());
@@ -70,18 +65,17 @@ fn each_kind_of_machine_gets_a_tuning_by_its_identity() {
         command.args(["predict", "--no-gpus", "--report"]).arg(reports.path()).args(more);
         command
     };
-    let told = failure_text(predict(&["--out"]).arg(&out));
+    let told = output(predict(&["--out"]).arg(&out), 1);
     assert!(told.contains("2 tunings written") && told.contains("no tuning: other programs disturbed it"), "{told}");
     let first = fs::read_to_string(reports.path().join("first.json")).unwrap();
     let first = sapwise_lab::report::read(&first).unwrap().value;
     let own = out.join(first.hardware.machine.tuning_file(2, &[]));
-    let tuning = sapwise_tune::json::tuning(&fs::read_to_string(&own).unwrap()).unwrap();
-    assert_eq!(tuning.source, sapwise::tuning::Source::Predicted);
+    let source = || sapwise_tune::json::tuning(&fs::read_to_string(&own).unwrap()).unwrap().source;
+    assert_eq!(source(), Source::Predicted);
     assert_eq!(fs::read_dir(&out).unwrap().count(), 2);
     fs::remove_file(reports.path().join("shared.json")).unwrap();
     success(predict(&["--measured", "--out"]).arg(&out));
-    let tuning = sapwise_tune::json::tuning(&fs::read_to_string(&own).unwrap()).unwrap();
-    assert_eq!(tuning.source, sapwise::tuning::Source::Measured);
+    assert_eq!(source(), Source::Measured);
     let nowhere = tunings.path().join("nowhere");
     for name in ["first.json", "second.json", "other.json"] {
         change(&reports.path().join(name), |report| report.label = Label::Published);

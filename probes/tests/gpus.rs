@@ -4,7 +4,7 @@ mod common;
 
 #[cfg(feature = "long-tests")]
 use common::failure;
-use common::{answer, devices_with_a_gpu, npy, renew, sapwise, success, tuning, without_adapters};
+use common::{answer, devices_with_a_gpu, list, npy, output, renew, sapwise, success, tuning, without_adapters, write};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -23,7 +23,7 @@ fn made_up(folder: &Path, name: &str, change: impl Fn(&mut Value)) -> PathBuf {
     let mut report: Value =
         serde_json::from_str(include_str!("../../crates/lab/tests/fixtures/report-3-gpu.json")).unwrap();
     renew(&mut report);
-    let points = report["points"].as_array().unwrap().clone();
+    let points = list(&report["points"]).to_vec();
     let again = points.iter().cycle().take(12).enumerate().map(|(k, point)| {
         let mut point = point.clone();
         point["scenario"] = format!("scenario {}", k / points.len()).into();
@@ -31,26 +31,24 @@ fn made_up(folder: &Path, name: &str, change: impl Fn(&mut Value)) -> PathBuf {
     });
     report["points"] = again.collect();
     change(&mut report);
-    let path = folder.join(name);
-    fs::write(&path, report.to_string()).unwrap();
-    path
+    write(folder, name, report.to_string())
 }
 
 fn ids(tuning: &Value) -> Vec<&str> {
-    tuning["costs"].as_array().unwrap().iter().map(|c| c["algorithm"].as_str().unwrap()).collect()
+    list(&tuning["costs"]).iter().map(|c| c["algorithm"].as_str().unwrap()).collect()
 }
 
 #[test]
 fn adapters_are_listed_with_every_algorithm_on_them() {
     let Some(answer) = devices_with_a_gpu("adapters_are_listed") else { return };
     let text = success(sapwise().arg("devices"));
-    for adapter in answer["adapters"].as_array().unwrap() {
+    for adapter in list(&answer["adapters"]) {
         for key in ["index", "name", "device", "driver", "api", "kind"] {
             assert!(!adapter[key].is_null(), "{key}: {adapter}");
         }
         assert!(text.contains(adapter["name"].as_str().unwrap()), "{text}");
         let id = format!("grid-sap@gpu{}", adapter["index"]);
-        let algorithm = answer["algorithms"].as_array().unwrap().iter().find(|a| a["id"] == id.as_str()).unwrap();
+        let algorithm = list(&answer["algorithms"]).iter().find(|a| a["id"] == id.as_str()).unwrap();
         assert_eq!(algorithm["available"], algorithm["reason"].is_null());
     }
 }
@@ -121,7 +119,7 @@ fn a_model_of_gpus_predicts_the_gpus_of_a_report() {
     let page = fs::read_to_string(&card).unwrap();
     assert!(page.contains("Kinds of GPU in the training: discrete; at most 2 together."), "{page}");
     let trained: Value = serde_json::from_str(&fs::read_to_string(&model).unwrap()).unwrap();
-    let ranges = trained["ranges"].as_array().unwrap();
+    let ranges = list(&trained["ranges"]);
     assert!(ranges.iter().any(|r| r["parameter"] == "gpu/round_trip_ns"), "{ranges:?}");
     let predict = |report: &Path, words: &[&str]| {
         let mut command = sapwise();
@@ -159,9 +157,9 @@ fn measured_tuning_leaves_out_software_adapters() {
 #[test]
 fn tuning_for_a_missing_gpu_is_run_on_the_rest() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("tuning.json");
-    fs::write(&path, tuning(&[(0, "brute@cpu1"), (100, "grid-sap@gpu99")]).to_string()).unwrap();
-    let complaint = String::from_utf8(sapwise().arg("check").arg(&path).output().unwrap().stdout).unwrap();
+    let steps = tuning(&[(0, "brute@cpu1"), (100, "grid-sap@gpu99")]);
+    let path = write(folder.path(), "tuning.json", steps.to_string());
+    let complaint = output(sapwise().arg("check").arg(&path), 1);
     assert!(complaint.contains("grid-sap@gpu99 can't run here: this machine has no gpu99"), "{complaint}");
     let run = ["run", "uniform", "--objects", "200", "--frames", "3", "--repeats", "1", "--json", "--tuning"];
     let told = answer(sapwise().args(run).arg(&path));
@@ -177,8 +175,7 @@ fn pairs_on_a_gpu_are_those_of_the_cpu() {
     let boxes = npy(folder.path(), "boxes.npy", "<f4", "500, 6", &row);
     let on = |id: &str| answer(sapwise().arg("pairs").arg(&boxes).args(["--json", "--algorithm", id]));
     let right = on("brute@cpu1");
-    let algorithms = devices["algorithms"].as_array().unwrap();
-    let on_gpus = algorithms.iter().filter(|a| a["id"].as_str().unwrap().contains("@gpu"));
+    let on_gpus = list(&devices["algorithms"]).iter().filter(|a| a["id"].as_str().unwrap().contains("@gpu"));
     for algorithm in on_gpus.filter(|a| a["available"] == true) {
         let told = on(algorithm["id"].as_str().unwrap());
         assert_eq!((&told["pairs"], &told["fingerprint"]), (&right["pairs"], &right["fingerprint"]), "{told}");

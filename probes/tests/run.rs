@@ -4,23 +4,21 @@ mod common;
 
 #[cfg(unix)]
 use common::{TERMINATED, interrupt_when, program, send};
-use common::{answer, failure, npy, sapwise, success, tuning};
+use common::{answer, failure, list, npy, sapwise, success, tuning, write};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Tuning that run the first algorithm below that many objects and the second from there on.
 fn steps(folder: &Path, first: &str, crossover: u32, second: &str) -> PathBuf {
-    let path = folder.join("steps.json");
-    fs::write(&path, tuning(&[(0, first), (crossover, second)]).to_string()).unwrap();
-    path
+    write(folder, "steps.json", tuning(&[(0, first), (crossover, second)]).to_string())
 }
 
 /// Tuning with the costs of `grid-sap` on one thread, and on so many.
 fn costs(folder: &Path, threads: u32) -> PathBuf {
     let (one, many) = ("grid-sap@cpu1".to_owned(), format!("grid-sap@cpu{threads}"));
     let devices: Value = answer(sapwise().args(["devices", "--no-gpus", "--json"]));
-    let own = devices["algorithms"].as_array().unwrap().iter().find(|a| a["id"] == "grid-sap@cpu1").unwrap();
+    let own = list(&devices["algorithms"]).iter().find(|a| a["id"] == "grid-sap@cpu1").unwrap();
     let mut fixture: Value =
         serde_json::from_str(include_str!("../../crates/tune/tests/fixtures/tuning-3.json")).unwrap();
     let cost = |id: &str| {
@@ -31,9 +29,7 @@ fn costs(folder: &Path, threads: u32) -> PathBuf {
     fixture["costs"] = json!([cost(&one), cost(&many)]);
     fixture["crossovers"] = json!([]);
     fixture["steps"] = json!([{"from_objects": 0, "algorithm": one}]);
-    let path = folder.join("costs.json");
-    fs::write(&path, fixture.to_string()).unwrap();
-    path
+    write(folder, "costs.json", fixture.to_string())
 }
 
 fn run(scene: impl AsRef<std::ffi::OsStr>, tuning: &Path, words: &[&str]) -> assert_cmd::Command {
@@ -54,7 +50,7 @@ fn a_recorded_scene_is_run_and_searched_like_the_scene() {
     assert_eq!((&again["objects"], &again["frames_run"]), (&recorded["objects"], &recorded["frames_run"]));
     assert!(again["switches"].as_u64().unwrap() > 0, "{again}");
     let few = answer(&mut run(&stream, &tuning, &["--repeats", "1", "--frames", "7", "--json"]));
-    assert_eq!(few["frames"], 7);
+    assert_eq!((&few["frames"], &few["parts"]), (&7.into(), &json!([])));
     // `pairs` sees as many boxes in each frame: none of the absent ones has a pair, or is refused.
     let pairs = answer(sapwise().arg("pairs").arg(&stream).arg("--json"));
     assert_eq!((&pairs["frames"], &pairs["objects"]), (&90.into(), &recorded["objects"]["max"]));
@@ -64,9 +60,9 @@ fn a_recorded_scene_is_run_and_searched_like_the_scene() {
 fn a_run_compares_the_choice_over_all_frames_and_over_parts() {
     let folder = tempfile::tempdir().unwrap();
     let tuning = steps(folder.path(), "brute@cpu1", 60, "grid-sap@cpu1");
-    let words = ["--objects", "200", "--frames", "30", "--repeats", "2", "--after", "10,20", "--json"];
+    let words = ["--objects", "200", "--frames", "30", "--repeats", "2", "--after", "20,10,20", "--json"];
     let told = answer(&mut run("fragmentation", &tuning, &words));
-    let parts = told["parts"].as_array().unwrap();
+    let parts = list(&told["parts"]);
     let range = |p: &Value| (p["from_frame"].as_u64().unwrap(), p["to_frame"].as_u64().unwrap());
     assert_eq!(parts.iter().map(range).collect::<Vec<_>>(), [(0, 9), (10, 19), (20, 29)]);
     for part in parts.iter().chain([&told]) {
@@ -148,7 +144,7 @@ fn what_can_not_be_run_is_refused_with_what_to_do() {
     let mut broken = good;
     broken[4] = f32::NAN;
     let scene = file("good.npy", "2, 1, 6", &[good, good]);
-    let cases: [(PathBuf, &[&str], i32, &[&str]); 11] = [
+    let cases: [(PathBuf, &[&str], i32, &[&str]); 13] = [
         (
             file("gap.npy", "1, 3, 6", &[good, nan, good]),
             &[],
@@ -158,12 +154,15 @@ fn what_can_not_be_run_is_refused_with_what_to_do() {
         (file("broken.npy", "2, 1, 6", &[good, broken]), &[], 1, &["broken.npy", "frame 1", "box 0", "NaN"]),
         (file("none.npy", "0, 5, 6", &[]), &[], 1, &["none.npy has no frames", "--record"]),
         (folder.path().join("absent.npy"), &[], 1, &["absent.npy"]),
-        ("unifrom".into(), &[], 2, &["no scenario", "uniform", "name a file"]),
+        // A file that exists is a stream, whatever its name.
+        ("Cargo.toml".into(), &[], 1, &["Cargo.toml"]),
+        ("unifrom".into(), &[], 2, &["no scenario", "uniform", "name a file of boxes"]),
         (scene.clone(), &["--frames", "3"], 2, &["--frames 3", "2 frames"]),
         ("uniform".into(), &["--objects", "-5"], 2, &["--objects", "a whole number from 1 to 10000000"]),
         ("uniform".into(), &["--objects", "500.5"], 2, &["--objects", "a whole number from 1 to 10000000"]),
         (scene.clone(), &["--objects", "3"], 2, &["--objects", "stream"]),
         ("uniform".into(), &["--frames", "5", "--after", "5"], 2, &["--after 5", "1 to 4"]),
+        ("uniform".into(), &["--frames", "5", "--after", "0"], 2, &["--after 0", "1 to 4"]),
         ("uniform".into(), &["--plot", "a.pdf"], 2, &["a.pdf", ".svg"]),
     ];
     for (scene, words, status, needed) in cases {

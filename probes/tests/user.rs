@@ -9,7 +9,7 @@ mod common;
 mod own_algorithm;
 
 use assert_cmd::Command;
-use common::{answer, failure, npy, sapwise, success};
+use common::{answer, failure, list, npy, output, sapwise, success};
 use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Pairs};
 use sapwise_cli::UserAlgorithm;
 use serde_json::Value;
@@ -83,10 +83,6 @@ fn read(path: &Path) -> Value {
     serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
 }
 
-fn names(list: &Value) -> Vec<&str> {
-    list.as_array().unwrap().iter().map(|entry| entry.as_str().unwrap()).collect()
-}
-
 /// The report of a small probe, changed to that of an optimised build on an undisturbed machine.
 fn probed(folder: &Path) -> PathBuf {
     let path = folder.join("report.json");
@@ -105,33 +101,23 @@ fn from_the_probe_to_the_run_as_one_of_ours() {
 
     let report = probed(folder.path());
     let told = read(&report);
-    let swept: Vec<(&str, u64)> = told["algorithms"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|t| (t["id"].as_str().unwrap(), t["revision"].as_u64().unwrap()))
-        .collect();
-    assert!(swept.contains(&("sweep@cpu1", 1)) && swept.iter().any(|t| t.0 == "brute@cpu1"), "{swept:?}");
-    let timed = told["algorithms"].as_array().unwrap().iter().find(|t| t["id"] == "sweep@cpu1").unwrap();
-    assert_eq!(timed["terms"].as_array().unwrap().len(), 4, "{timed}");
-    assert!(
-        told["algorithms"].as_array().unwrap().iter().all(|t| t["id"] == "sweep@cpu1" || t.get("terms").is_none()),
-        "{told}"
-    );
-    let points = told["points"].as_array().unwrap();
-    let timings = points.iter().flat_map(|p| p["timings"].as_array().unwrap());
+    let swept = list(&told["algorithms"]);
+    assert!(swept.iter().any(|t| t["id"] == "brute@cpu1"), "{swept:?}");
+    let timed = swept.iter().find(|t| t["id"] == "sweep@cpu1").unwrap();
+    assert_eq!((&timed["revision"], list(&timed["terms"]).len()), (&1.into(), 4), "{timed}");
+    assert!(swept.iter().all(|t| t["id"] == "sweep@cpu1" || t.get("terms").is_none()), "{swept:?}");
+    let timings = list(&told["points"]).iter().flat_map(|p| list(&p["timings"]));
     let own: Vec<&Value> = timings.filter(|t| t["algorithm"] == "sweep@cpu1").collect();
     assert!(own.len() >= 6 && own.iter().all(|t| t["error"].is_null()), "{own:?}");
 
     let model = file("model.json");
     success(user().arg("train").arg(&report).arg("--out").arg(&model));
     let fitted = read(&model);
-    let of_user =
-        fitted["methods"].as_array().unwrap().iter().find(|m| m["method"] == "sweep").expect("a cost of sweep");
+    let of_user = list(&fitted["methods"]).iter().find(|m| m["method"] == "sweep").expect("a cost of sweep");
     assert_eq!((&of_user["revision"], &of_user["backend"]), (&1.into(), &"cpu".into()));
     // A sweep as short as this may not show every term of the user; no other term is ever fitted.
-    let named = |fitted: &Value| timed["terms"].as_array().unwrap().iter().any(|t| t["term"] == fitted["term"]);
-    let terms = of_user["terms"].as_array().unwrap();
+    let named = |fitted: &Value| list(&timed["terms"]).iter().any(|t| t["term"] == fitted["term"]);
+    let terms = list(&of_user["terms"]);
     assert!(!terms.is_empty() && terms.iter().all(named), "{terms:?}");
 
     let tuning = file("tuning.json");
@@ -142,10 +128,10 @@ fn from_the_probe_to_the_run_as_one_of_ours() {
     // The plain command predicts the library's algorithms, and says what it can't choose.
     let plain = predict(sapwise());
     assert!(!plain["costs"].to_string().contains("sweep"), "{plain}");
-    let warned = names(&plain["warnings"]).iter().any(|w| w.contains("knows sweep, which is not in this build"));
+    let warned = plain["warnings"].to_string().contains("knows sweep, which is not in this build");
     assert!(warned, "{}", plain["warnings"]);
     let own = predict(user());
-    assert!(own["costs"].as_array().unwrap().iter().any(|c| c["algorithm"] == "sweep@cpu1"), "{own}");
+    assert!(list(&own["costs"]).iter().any(|c| c["algorithm"] == "sweep@cpu1"), "{own}");
     assert!(!own["warnings"].to_string().contains("sweep"), "{}", own["warnings"]);
     // The built-in model does not know it.
     let built_in = success(user().args(["predict", "--json", "--report"]).arg(&report));
@@ -159,18 +145,16 @@ fn from_the_probe_to_the_run_as_one_of_ours() {
     check_names_a_number_of_threads_that_it_can_not_be_made_on(&tuning);
     for path in [&report, &model, &tuning] {
         success(user().arg("check").arg(path));
-        let told = sapwise().arg("check").arg(path).output().unwrap();
-        let text = String::from_utf8(told.stdout).unwrap();
-        assert!(told.status.code() == Some(1) && text.contains("stale: sweep is not in this build"), "{text}");
+        let text = output(sapwise().arg("check").arg(path), 1);
+        assert!(text.contains("stale: sweep is not in this build"), "{text}");
     }
 }
 
 fn check_names_a_number_of_threads_that_it_can_not_be_made_on(tuning: &Path) {
     let other = tuning.with_file_name("two-threads.json");
     fs::write(&other, fs::read_to_string(tuning).unwrap().replace("sweep@cpu1", "sweep@cpu2")).unwrap();
-    let told = user().arg("check").arg(&other).output().unwrap();
-    let text = String::from_utf8(told.stdout).unwrap();
-    assert!(told.status.code() == Some(1) && text.contains("sweep@cpu2") && !text.contains("stale"), "{text}");
+    let text = output(user().arg("check").arg(&other), 1);
+    assert!(text.contains("sweep@cpu2") && !text.contains("stale"), "{text}");
 }
 
 fn the_pairs_are_those_of_ours() {
@@ -195,7 +179,7 @@ fn the_pairs_are_those_of_ours() {
             answer(user().arg("pairs").arg(&path).args(words))
         };
         let (ours, own) = (pairs("brute@cpu1"), pairs("sweep@cpu1"));
-        assert_eq!(ours["pairs"].as_array().unwrap().len(), frames);
+        assert_eq!(list(&ours["pairs"]).len(), frames);
         assert_eq!((&own["pairs"], &own["fingerprint"]), (&ours["pairs"], &ours["fingerprint"]), "{}", path.display());
     }
 }
@@ -215,7 +199,7 @@ fn one_on_several_threads_gets_their_number() {
     let folder = tempfile::tempdir().unwrap();
     let boxes = npy(folder.path(), "one.npy", "<f4", "1, 6", &[0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
     let told = answer(program("threads").args(["devices", "--no-gpus", "--json"]));
-    let ids = told["algorithms"].as_array().unwrap().iter().map(|a| a["id"].as_str().unwrap());
+    let ids = list(&told["algorithms"]).iter().map(|a| a["id"].as_str().unwrap());
     let on = |method: &str| -> Vec<u32> {
         let id = |text: &str| text.parse::<AlgorithmId>().unwrap();
         ids.clone().map(id).filter(|id| id.method() == method).map(|id| id.threads()).collect()

@@ -120,18 +120,8 @@ pub fn scores(validation: &Validation, draw: impl FnOnce(&[Vec<String>]) -> Stri
         return format!("{data}; not validated.\n");
     }
     let doubt = if *physical_machines < 2 { " This says little about machines never seen." } else { "" };
-    let head = [
-        "strategy",
-        "unseen scenario",
-        "seen scenario",
-        "least to largest",
-        "one thread",
-        "several",
-        "by means",
-        "crossovers off by",
-        "over 10 %",
-    ];
-    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    let head = "strategy, unseen scenario, seen scenario, least to largest, one thread, several, by means, crossovers off by,                 over 10 %";
+    let mut rows: Vec<Vec<String>> = vec![head.split(", ").map(str::to_owned).collect()];
     for m in methods {
         let seen = Regrets { all: m.mean_regret, in_games: m.mean_regret_in_games.unwrap_or_default() };
         let octaves = m.crossing_error_octaves.zip(m.crossings_within_half_octave);

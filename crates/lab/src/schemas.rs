@@ -31,17 +31,3 @@ fn with_training(model: &str) -> Result<String, Error> {
     model["properties"]["training"] = training;
     json::write(&model)
 }
-
-#[cfg(test)]
-mod tests {
-    use std::path::Path;
-
-    #[test]
-    fn committed_schemas_are_those_of_the_types() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../schemas");
-        for (name, text) in super::schemas().unwrap() {
-            let committed = std::fs::read_to_string(folder.join(&name)).unwrap_or_default();
-            assert!(committed == text, "{name} is stale: run `cargo run -- schema --out schemas`");
-        }
-    }
-}

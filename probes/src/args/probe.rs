@@ -65,10 +65,11 @@ impl Probe {
     pub(crate) fn scenarios(&self) -> Vec<Scenario> {
         once(self.scenarios.iter().copied())
     }
-    /// The arguments after `sapwise probe`.
+
+    /// Parses the words after `sapwise probe`, with blanks between.
     #[cfg(test)]
-    pub(crate) fn of(words: &[&str]) -> Self {
-        let all = ["sapwise", "probe"].iter().chain(words);
+    pub(crate) fn of(words: &str) -> Self {
+        let all = ["sapwise", "probe"].into_iter().chain(words.split_whitespace());
         match <super::Arguments as clap::Parser>::try_parse_from(all).unwrap().verb {
             super::Verb::Probe(probe) => probe,
             other => panic!("{other:?}"),

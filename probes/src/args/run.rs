@@ -95,18 +95,3 @@ impl FromStr for Scene {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_scene_is_a_scenario_or_a_file() {
-        let read = |text: &str| text.parse::<Scene>();
-        assert_eq!(read("slab"), Ok(Scene::Scenario(Scenario::Slab)));
-        assert_eq!(read("missing.npy"), Ok(Scene::Stream("missing.npy".into())));
-        assert!(read("Cargo.toml").is_ok_and(|s| matches!(s, Scene::Stream(_))));
-        let why = read("slap").unwrap_err();
-        assert!(why.contains("no scenario") && why.contains("slab") && why.contains("name a file of boxes"), "{why}");
-    }
-}

@@ -164,8 +164,8 @@ mod tests {
     use super::*;
     use sapwise_lab::report::{Label, Report};
 
-    fn full(words: &[&str]) -> Profile {
-        let probe = Probe::of(&[&["--profiles", "--no-gpus"], words].concat());
+    fn full(words: &str) -> Profile {
+        let probe = Probe::of(&format!("--profiles --no-gpus {words}"));
         profiles(&probe, 1, SimdLevel::Portable, &[]).swap_remove(0)
     }
 
@@ -182,7 +182,7 @@ mod tests {
         report.remarks.clear();
         report.provenance.simd = None;
         report.provenance.optimised = true;
-        report.provenance.command = full(&[]).command;
+        report.provenance.command = full("").command;
         let folder = tempfile::tempdir().unwrap();
         let folder = Folder {
             path: folder.path().to_owned(),
@@ -190,21 +190,21 @@ mod tests {
             registry: Registry::with_cores(1),
         };
         std::fs::create_dir_all(&folder.path).unwrap();
-        let lack = |words: &[&str], change: &dyn Fn(&mut Report)| {
+        let lack = |words: &str, change: &dyn Fn(&mut Report)| {
             let mut report = report.clone();
             change(&mut report);
             std::fs::write(folder.path.join("full.json"), sapwise_lab::report::write(&report).unwrap()).unwrap();
             folder.lack(&full(words)).map_err(|e| format!("{e:#}"))
         };
-        assert_eq!(lack(&[], &|_| ()), Ok(None));
-        let disturbed = lack(&[], &|r| r.label = Label::RealContended);
+        assert_eq!(lack("", &|_| ()), Ok(None));
+        let disturbed = lack("", &|r| r.label = Label::RealContended);
         assert_eq!(disturbed, Ok(Some("other programs disturbed it".to_owned())));
         for remark in ["interrupted", "clustered is incomplete: its process crashed", "WRONG ANSWER: sap@cpu1"] {
-            assert!(lack(&[], &|r| r.remarks.push(remark.to_owned())).unwrap().is_some(), "{remark}");
+            assert!(lack("", &|r| r.remarks.push(remark.to_owned())).unwrap().is_some(), "{remark}");
         }
-        assert!(lack(&["--seed=2"], &|_| ()).unwrap_err().contains("another command"));
+        assert!(lack("--seed=2", &|_| ()).unwrap_err().contains("another command"));
         assert!(
-            lack(&[], &|r| r.hardware.machine.physical_id = "1".repeat(16)).unwrap_err().contains("another machine")
+            lack("", &|r| r.hardware.machine.physical_id = "1".repeat(16)).unwrap_err().contains("another machine")
         );
     }
 }

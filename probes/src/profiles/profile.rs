@@ -103,7 +103,7 @@ mod tests {
     use super::*;
 
     fn all(cores: u32, level: SimdLevel, gpus: &[GpuIdentity]) -> Vec<Profile> {
-        profiles(&Probe::of(&["--profiles", "--seed=3"]), cores, level, gpus)
+        profiles(&Probe::of("--profiles --seed=3"), cores, level, gpus)
     }
 
     fn gpu(index: u32, name: &str, kind: GpuKind) -> GpuIdentity {
@@ -132,6 +132,6 @@ mod tests {
         assert_eq!(all[1].command, "probe --no-gpus --threads 1 --seed 3");
         assert_eq!(all[7].command, "probe --quick --gpu 2 --gpu 3 --seed 3");
         assert_eq!(all[9].command, all[1].command);
-        Probe::of(&all[7].command.split(' ').skip(1).collect::<Vec<_>>());
+        Probe::of(all[7].command.strip_prefix("probe").unwrap());
     }
 }

@@ -86,7 +86,10 @@ impl Race {
     pub(crate) fn run(&mut self, racers: &mut [Racer], scene: &mut Scene, time: Duration) -> Raced {
         let began = Instant::now();
         let mut mismatches = Vec::new();
-        racers.iter_mut().for_each(Racer::begin);
+        for racer in racers.iter_mut() {
+            racer.samples.clear();
+            racer.rests = false;
+        }
         let core_to_core = core_to_core_ns(&self.cores);
         // The first frame warms buffers, thread pools and branch predictors, and is not counted.
         self.frame(racers, scene, |_| true, &mut mismatches);
@@ -117,7 +120,8 @@ impl Race {
                 if racers.iter().all(|r| !r.rests) {
                     shortest = shortest.min(started.elapsed());
                 }
-                loads.push(self.load(scene, pairs_before));
+                let motion = self.displacement.motion(scene.boxes());
+                loads.push(Load::estimate(scene.boxes(), pairs_before.map(|pairs| pairs as f64), motion));
                 fresh += 1;
             }
             let foreign = watch.foreign_load();
@@ -207,11 +211,6 @@ impl Race {
         }
     }
 
-    /// The load of the frame that ran, with the pairs of the previous one.
-    fn load(&self, scene: &Scene, before: Option<u64>) -> Load {
-        Load::estimate(scene.boxes(), before.map(|pairs| pairs as f64), self.displacement.motion(scene.boxes()))
-    }
-
     /// The point without foreign load and core-to-core latency.
     fn point(&self, racers: &[Racer], scene: &Scene, load: Load) -> Point {
         let answer = racers.iter().filter(|r| r.error.is_none()).find_map(|r| r.answer);
@@ -244,12 +243,6 @@ fn mean(loads: &[Load]) -> Load {
 }
 
 impl Racer {
-    /// Prepares it for a point.
-    fn begin(&mut self) {
-        self.samples.clear();
-        self.rests = false;
-    }
-
     fn races(&self) -> bool {
         self.error.is_none() && !self.rests
     }
@@ -277,9 +270,13 @@ mod tests {
     use std::sync::Arc;
     use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
+    fn brute() -> Box<dyn BroadPhase> {
+        sapwise::Registry::new().create(&"brute@cpu1".parse().unwrap()).unwrap()
+    }
+
     #[test]
     fn samples_are_kept_from_all_over_a_window() {
-        let mut racer = Racer::new("brute@cpu1".parse().unwrap(), Box::new(Wrong));
+        let mut racer = Racer::new("brute@cpu1".parse().unwrap(), brute());
         racer.samples = (0..103).collect();
         racer.keep(3, 10);
         assert_eq!(racer.samples, [0, 1, 2, 3, 13, 23, 33, 43, 53, 63, 73, 83, 93]);
@@ -294,7 +291,7 @@ mod tests {
 
     impl BroadPhase for Wrong {
         fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), sapwise::Error> {
-            sapwise::Registry::new().create(&"brute@cpu1".parse().unwrap())?.find_pairs(boxes, pairs)?;
+            brute().find_pairs(boxes, pairs)?;
             pairs.push(0, 1);
             pairs.push(0, 1);
             pairs.finish()
@@ -303,11 +300,8 @@ mod tests {
 
     #[test]
     fn a_wrong_answer_is_found_and_costs_only_the_one_that_returned_it() {
-        let right = || sapwise::Registry::new().create(&"brute@cpu1".parse().unwrap()).unwrap();
-        let mut racers = vec![
-            Racer::new("wrong@cpu1".parse().unwrap(), Box::new(Wrong)),
-            Racer::new("brute@cpu1".parse().unwrap(), right()),
-        ];
+        let racer = |id: &str, algorithm| Racer::new(id.parse().unwrap(), algorithm);
+        let mut racers = vec![racer("wrong@cpu1", Box::new(Wrong)), racer("brute@cpu1", brute())];
         let mut scene = sapwise_scenes::Scenario::Uniform.start(50, 1);
         let outcome = Race::new(1, 1000, 1).run(&mut racers, &mut scene, Duration::from_millis(1));
         assert_eq!(outcome.mismatches.len(), 1);
@@ -335,21 +329,17 @@ mod tests {
     #[test]
     fn an_incremental_algorithm_runs_some_frames_more_before_the_samples() {
         // One box has no pairs, so that finding none is right.
-        let [without, with] = {
-            let frames = [(); 2].map(|()| Arc::<AtomicUsize>::default());
-            let racer = |k: usize| {
-                Racer::new(
-                    format!("counting@cpu{}", k + 1).parse().unwrap(),
-                    Box::new(Counting(frames[k].clone(), k == 1)),
-                )
-            };
-            let mut racers = vec![racer(0), racer(1)];
-            let mut scene = sapwise_scenes::Scenario::Resting.start(1, 1);
-            let outcome = Race::new(1, 1000, 1).run(&mut racers, &mut scene, Duration::ZERO);
-            assert!(outcome.mismatches.is_empty(), "{:?}", outcome.mismatches);
-            assert!((0.0..=0.06).contains(&outcome.point.load.moved));
-            frames.map(|f| f.load(Relaxed))
-        };
+        let frames = [(); 2].map(|()| Arc::<AtomicUsize>::default());
+        let mut racers = ["once@cpu1", "incremental@cpu1"].map(|id| {
+            let incremental = id.starts_with("incremental");
+            let counting = Counting(frames[usize::from(incremental)].clone(), incremental);
+            Racer::new(id.parse().unwrap(), Box::new(counting))
+        });
+        let mut scene = sapwise_scenes::Scenario::Resting.start(1, 1);
+        let outcome = Race::new(1, 1000, 1).run(&mut racers, &mut scene, Duration::ZERO);
+        assert!(outcome.mismatches.is_empty(), "{:?}", outcome.mismatches);
+        assert!((0.0..=0.06).contains(&outcome.point.load.moved));
+        let [without, with] = frames.map(|f| f.load(Relaxed));
         assert_eq!(with - without, WARM_UP);
     }
 
@@ -367,8 +357,7 @@ mod tests {
 
     #[test]
     fn too_many_pairs_end_the_race_with_an_error() {
-        let brute = sapwise::Registry::new().create(&"brute@cpu1".parse().unwrap()).unwrap();
-        let mut racers = vec![Racer::new("brute@cpu1".parse().unwrap(), brute)];
+        let mut racers = vec![Racer::new("brute@cpu1".parse().unwrap(), brute())];
         let mut scene = sapwise_scenes::Scenario::Uniform.start(500, 1);
         let outcome = Race::new(1, 3, 1).run(&mut racers, &mut scene, Duration::from_millis(1));
         assert!(outcome.point.timings[0].error.as_ref().unwrap().contains("limit of 3"));

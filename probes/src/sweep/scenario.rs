@@ -212,31 +212,26 @@ mod tests {
         SweepRequest { scenario, schedule, cores: 2, seed: 3, seconds, gpus: Vec::new() }
     }
 
-    fn events(request: &SweepRequest, algorithms: &Algorithms) -> Vec<Event> {
-        let mut events = Vec::new();
+    /// The points and the remarks of a sweep.
+    fn swept(request: &SweepRequest, algorithms: &Algorithms) -> (Vec<Point>, Vec<String>) {
+        let (mut points, mut remarks) = (Vec::new(), Vec::new());
         let mut keep = |event| {
-            assert!(!matches!(event, Event::Mismatch(_)), "{event:?}");
-            events.push(event);
+            match event {
+                Event::Point(point) => points.push(*point),
+                Event::Remark(text) => remarks.push(text),
+                Event::Mismatch(text) => panic!("{text}"),
+            }
             Ok(())
         };
         sweep(request, algorithms, &mut keep).unwrap();
-        events
-    }
-
-    fn remarks(events: &[Event]) -> Vec<&str> {
-        events.iter().filter_map(|e| if let Event::Remark(text) = e { Some(&**text) } else { None }).collect()
-    }
-
-    fn points(events: &[Event]) -> Vec<&Point> {
-        events.iter().filter_map(|e| if let Event::Point(p) = e { Some(&**p) } else { None }).collect()
+        (points, remarks)
     }
 
     #[test]
     fn every_point_has_samples_of_all_algorithms_and_the_size_asked_for() {
         for scenario in ["uniform", "fragmentation"] {
-            let events = events(&request(scenario, &[10, 300], 10.0), &Algorithms::default());
-            let points = points(&events);
-            assert_eq!(points.iter().map(|p| p.load.objects).collect::<Vec<_>>(), [10, 300], "{events:?}");
+            let (points, remarks) = swept(&request(scenario, &[10, 300], 10.0), &Algorithms::default());
+            assert_eq!(points.iter().map(|p| p.load.objects).collect::<Vec<_>>(), [10, 300], "{remarks:?}");
             for point in points {
                 assert!(point.timings.len() >= 2);
                 let frames = point.timings.iter().map(|t| t.samples_ns.len());
@@ -254,8 +249,7 @@ mod tests {
         // With one alone no choice is in doubt.
         let visits = vec![visit(300, &algorithms), visit(20, &algorithms), visit(50, &algorithms[..1])];
         let request = SweepRequest { schedule: Schedule::Visits(visits), ..request("clustered", &[], 60.0) };
-        let events = events(&request, &Algorithms::default());
-        let points = points(&events);
+        let points = swept(&request, &Algorithms::default()).0;
         assert_eq!(points.iter().map(|p| p.load.objects).collect::<Vec<_>>(), [300, 20]);
         for point in points {
             let raced: Vec<_> = point.timings.iter().map(|t| t.algorithm.clone()).collect();
@@ -265,21 +259,17 @@ mod tests {
 
     #[test]
     fn a_size_that_does_not_fit_is_told() {
-        let events = events(&request("uniform", &[10, 1_000_000], 0.0), &Algorithms::default());
-        assert_eq!(points(&events).len(), 1);
-        assert!(
-            matches!(events.last(), Some(Event::Remark(text)) if text.contains("1000000 objects would exceed")),
-            "{events:?}"
-        );
+        let (points, remarks) = swept(&request("uniform", &[10, 1_000_000], 0.0), &Algorithms::default());
+        assert_eq!(points.len(), 1);
+        assert!(remarks.last().is_some_and(|text| text.contains("1000000 objects would exceed")), "{remarks:?}");
     }
 
     #[test]
     fn a_gpu_that_is_gone_is_a_remark_and_the_sweep_goes_on() {
         let gone = GpuIdentity::new(99, "none such", sapwise_tune::GpuKind::Discrete);
         let request = SweepRequest { gpus: vec![gone], ..request("uniform", &[10], 1.0) };
-        let events = events(&request, &Algorithms::default());
-        let remarks = remarks(&events);
-        assert_eq!((points(&events).len(), remarks.len()), (1, 1), "{remarks:?}");
+        let (points, remarks) = swept(&request, &Algorithms::default());
+        assert_eq!((points.len(), remarks.len()), (1, 1), "{remarks:?}");
         assert!(remarks[0].contains("gpu99 (none such) was there"), "{remarks:?}");
     }
 
@@ -290,9 +280,8 @@ mod tests {
         algorithms.add(UserAlgorithm::on_one_thread("mine", 1, brute)).unwrap();
         let refused = || Err(sapwise::Error::OutOfMemory { what: "nodes", elements: 3 });
         algorithms.add(UserAlgorithm::on_one_thread("huge", 1, refused)).unwrap();
-        let events = events(&request("uniform", &[10], 1.0), &algorithms);
-        let timings = points(&events).into_iter().flat_map(|point| &point.timings);
-        let (raced, remarks) = (timings.map(|t| t.algorithm.to_string()).collect::<Vec<_>>(), remarks(&events));
+        let (points, remarks) = swept(&request("uniform", &[10], 1.0), &algorithms);
+        let raced: Vec<String> = points[0].timings.iter().map(|t| t.algorithm.to_string()).collect();
         assert!(raced.contains(&"mine@cpu1".to_owned()) && !raced.contains(&"huge@cpu1".to_owned()), "{raced:?}");
         assert_eq!(remarks.len(), 1, "{remarks:?}");
         assert!(remarks[0].starts_with("uniform: huge@cpu1 is left out: no memory for 3 nodes"), "{remarks:?}");

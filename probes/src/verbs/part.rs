@@ -9,7 +9,7 @@ use sapwise::algorithm::Backend;
 use sapwise_tune::measure::Options;
 
 pub(crate) fn run(part: Part, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
-    child::end_with_parent();
+    child::when_parent_ends(|| std::process::exit(1));
     match part {
         Part::Gpus => gpus::print_identities()?,
         Part::GpuAlgorithms => gpus::print_entries()?,

@@ -42,7 +42,7 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
     let destination = if arguments.json && out.is_none() { None } else { Some(Destination::new(out)?) };
     interrupt::listen()?;
     if arguments.leashed {
-        child::stop_with_parent();
+        child::when_parent_ends(interrupt::request);
     }
     let (hardware, measured) = measure_hardware(arguments.threads, &arguments.gpus)?;
     let told = summary::gpus_left_out(&arguments.gpus, &hardware, &measured.left_out, &measured.remarks);

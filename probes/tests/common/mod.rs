@@ -24,7 +24,7 @@ pub(crate) fn small_report(machine: &str) -> Value {
     let mut report: Value = serde_json::from_str(text).unwrap();
     renew(&mut report);
     report["hardware"]["machine"]["physical_id"] = machine.repeat(16).into();
-    let points = report["points"].as_array().unwrap().clone();
+    let points = list(&report["points"]).to_vec();
     let scenarios = ["uniform", "slab", "mixed", "fast"].into_iter().flat_map(|scenario| {
         points.iter().cloned().map(move |mut point| {
             point["scenario"] = scenario.into();
@@ -60,7 +60,7 @@ pub(crate) fn without_adapters(command: &mut Command) -> &mut Command {
 /// so, or a failure with `SAPWISE_REQUIRE_GPU=1`.
 pub(crate) fn devices_with_a_gpu(test: &str) -> Option<Value> {
     let answer: Value = answer(sapwise().args(["devices", "--json"]));
-    if answer["adapters"].as_array().unwrap().is_empty() {
+    if list(&answer["adapters"]).is_empty() {
         let required = std::env::var("SAPWISE_REQUIRE_GPU").is_ok_and(|v| v == "1");
         assert!(!required, "SAPWISE_REQUIRE_GPU=1, and no adapter was found: {}", answer["remark"]);
         eprintln!("{test} is skipped: no adapter was found");
@@ -97,11 +97,29 @@ pub(crate) fn interrupt_when(command: &mut std::process::Command, ready: impl Fn
 
 /// Runs to exit status 0 and returns standard output.
 pub(crate) fn success(command: &mut Command) -> String {
+    output(command, 0)
+}
+
+/// Runs to this exit status and returns standard output.
+pub(crate) fn output(command: &mut Command, status: i32) -> String {
     let ended = command.output().unwrap();
     let complaint = String::from_utf8_lossy(&ended.stderr).into_owned();
     let told = String::from_utf8(ended.stdout).unwrap();
-    assert_eq!(ended.status.code(), Some(0), "{command:?}: {complaint}{told}");
+    assert_eq!(ended.status.code(), Some(status), "{command:?}: {complaint}{told}");
+    assert!(!complaint.contains("panicked"), "{complaint}");
     told
+}
+
+/// Writes a file below a folder and returns its path.
+pub(crate) fn write(folder: &Path, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
+    let path = folder.join(name);
+    std::fs::write(&path, content).unwrap();
+    path
+}
+
+/// Returns the elements of a list.
+pub(crate) fn list(value: &Value) -> &[Value] {
+    value.as_array().unwrap()
 }
 
 /// Runs to exit status 0 and returns the JSON on standard output.
@@ -140,7 +158,5 @@ pub(crate) fn npy(folder: &Path, name: &str, dtype: &str, shape: &str, data: &[f
     bytes.extend((header.len() as u16).to_le_bytes());
     bytes.extend(header.as_bytes());
     bytes.extend(data.iter().flat_map(|x| x.to_le_bytes()));
-    let path = folder.join(name);
-    std::fs::write(&path, bytes).unwrap();
-    path
+    write(folder, name, bytes)
 }

@@ -44,21 +44,14 @@ enum Part<'a> {
 }
 
 impl Part<'_> {
-    fn deviation_ln(&self) -> f64 {
-        match self {
-            Self::Class(_) => CLASS_LN,
-            Self::Width(..) => WIDTH_LN,
-            Self::Method(..) => METHOD_LN,
-            Self::Incremental => INCREMENTAL_LN,
-        }
-    }
-
-    fn of(cost: &AlgorithmCost) -> impl Iterator<Item = Part<'_>> {
+    /// Returns the parts of a cost, each with its standard deviation.
+    fn of(cost: &AlgorithmCost) -> impl Iterator<Item = (Part<'_>, f64)> {
         let (backend, method) = (cost.algorithm.backend(), cost.algorithm.method());
         let class = backend.class();
-        let width = (backend.width() > 1).then(|| Part::Width(class, backend.width()));
-        let incremental = is_incremental(method).then_some(Part::Incremental);
-        [Some(Part::Class(class)), width, Some(Part::Method(class, method)), incremental].into_iter().flatten()
+        let width = (backend.width() > 1).then(|| (Part::Width(class, backend.width()), WIDTH_LN));
+        let incremental = is_incremental(method).then_some((Part::Incremental, INCREMENTAL_LN));
+        let method = (Part::Method(class, method), METHOD_LN);
+        [Some((Part::Class(class), CLASS_LN)), width, Some(method), incremental].into_iter().flatten()
     }
 }
 
@@ -122,7 +115,8 @@ struct Found {
 
 /// The shared parts of some costs.
 struct Parts<'a> {
-    shared: Vec<Part<'a>>,
+    /// Each with its standard deviation.
+    shared: Vec<(Part<'a>, f64)>,
     /// By cost: the positions of its shared parts.
     of_cost: Vec<Vec<usize>>,
     /// Number of functions of the load.
@@ -131,7 +125,7 @@ struct Parts<'a> {
 
 impl<'a> Parts<'a> {
     fn new(costs: &'a [AlgorithmCost], curve: usize) -> Self {
-        let mut shared: Vec<Part<'a>> = Vec::new();
+        let mut shared: Vec<(Part<'a>, f64)> = Vec::new();
         let mut position = |part| position_or_push(&mut shared, part);
         let of_cost = costs.iter().map(|cost| Part::of(cost).map(&mut position).collect()).collect();
         Self { shared, of_cost, curve }
@@ -145,7 +139,7 @@ impl<'a> Parts<'a> {
     /// Returns the position and the value of each part of a cost, whose weights have unit normal priors.
     fn features(&self, algorithm: usize, curve: ArrayView1<'_, f64>) -> Vec<(usize, f64)> {
         let own = self.own(algorithm);
-        let shared = self.of_cost[algorithm].iter().map(|&k| (k, self.shared[k].deviation_ln()));
+        let shared = self.of_cost[algorithm].iter().map(|&k| (k, self.shared[k].1));
         let curve = curve.iter().enumerate().map(|(j, value)| (own + 1 + j, CURVE_LN * value));
         shared.chain([(own, CONSTANT_LN)]).chain(curve).collect()
     }

@@ -161,17 +161,3 @@ fn parts(after: &[usize], frames: usize) -> Result<Vec<Range<usize>>, WrongUsage
     let parts = ends.windows(2).map(|w| w[0]..w[1]);
     Ok(if after.is_empty() { Vec::new() } else { parts.collect() })
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn parts_lie_between_the_frames_of_after() {
-        assert_eq!(parts(&[50, 20, 50], 200).unwrap(), [0..20, 20..50, 50..200]);
-        assert!(parts(&[], 200).unwrap().is_empty());
-        for outside in [0, 200] {
-            assert!(parts(&[outside], 200).unwrap_err().to_string().contains("1 to 199"));
-        }
-    }
-}
