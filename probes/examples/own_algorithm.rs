@@ -18,7 +18,7 @@ use std::process::ExitCode;
 
 /// Visible to the test of this example, which is a command with the same `main`.
 pub(crate) fn main() -> ExitCode {
-    // The name stands in reports, models and tunings. The 1 is the revision: raise it whenever `find_pairs` gets
+    // The name appears in reports, models and tunings. The 1 is the revision: raise it whenever `find_pairs` gets
     // faster or slower, so that older measurements are recognised as stale. `UserAlgorithm::on_threads` adds an
     // algorithm on several threads.
     let sweep = UserAlgorithm::on_one_thread("sweep", 1, || Ok(Box::new(Sweep::default())));

@@ -53,8 +53,9 @@ impl UserAlgorithm {
         Self { method: method.to_owned(), revision, parallel, terms: Vec::new(), factory }
     }
 
-    /// Sets what the time of a frame grows with and which hardware parameter each term depends on; `train` fits a unit
-    /// for each. Without this the terms are calls, objects, sorting, all pairs, candidates on an axis and pairs.
+    /// Sets the terms of the time of a frame: a count of the load, and the hardware parameter that it scales with.
+    /// `train` fits a unit for each. Without this the terms are calls, objects, sorting, all pairs, candidates on an
+    /// axis and pairs.
     ///
     /// `probes/examples/own_algorithm.rs` declares a sort of `log2 n` steps for each object.
     #[must_use]
@@ -66,8 +67,8 @@ impl UserAlgorithm {
 
 /// The algorithms on the CPU that the command knows.
 ///
-/// Every verb gets it from the start of the command, and makes each [`Registry`] with it: one made elsewhere would lack
-/// the user's. It is no global, so that two tests of one process can have different ones.
+/// Every verb gets it from the start of the command, and makes each [`Registry`] with it: one made elsewhere would
+/// lack the user's. It is no global, so that two tests of one process can have different ones.
 #[derive(Default)]
 pub(crate) struct Algorithms {
     users: Vec<UserAlgorithm>,

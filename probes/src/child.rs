@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 /// Interval of looking at the clock and for Ctrl-C.
 const POLL: Duration = Duration::from_millis(50);
 
-/// Time for a process that stops with this one to write what it has. It ends its own parts at once.
+/// Time for a process that stops with this one to write its results. It ends its own parts at once.
 const SAVING: Duration = Duration::from_secs(20);
 
 /// The end of a part.
@@ -41,14 +41,14 @@ pub(crate) fn run_part(
     run(command.arg("part").args(arguments), limit, Duration::ZERO, on_line, &mut || {})
 }
 
-/// Runs a part and returns what it prints as JSON, one value a line.
+/// Runs a part and returns the JSON values that it prints, one a line.
 ///
 /// # Errors
 /// When the process can't be started.
 pub(crate) fn answers<T: DeserializeOwned>(arguments: &[&str], limit: Duration) -> anyhow::Result<(Vec<T>, Ended)> {
     let mut answers = Vec::new();
     let ended = run_part(arguments, limit, &mut |line| {
-        // Drivers print what they like on the standard output of whoever loads them.
+        // Drivers may print anything on the standard output of the process that loads them.
         answers.extend(serde_json::from_str::<T>(line));
         Ok(())
     })?;
@@ -71,8 +71,8 @@ pub(crate) fn run_verb(
     run(&mut command, limit, SAVING, &mut |_| Ok(()), on_wait)
 }
 
-/// Returns this program as a command. On a system that does not tell its path, such as Linux without `/proc`, by its
-/// own name.
+/// Returns this program as a command: by its path, or by its name on a system that does not report the path, such as
+/// Linux without `/proc`.
 fn own_program() -> anyhow::Result<Command> {
     let path = std::env::current_exe().or_else(|error| std::env::args_os().next().map(Into::into).ok_or(error));
     Ok(Command::new(path.context("the program can't find itself")?))
@@ -106,7 +106,7 @@ fn run(
             Err(RecvTimeoutError::Timeout) => {}
         }
         if interrupt::requested() {
-            // A process that stops with this one gets time to write what it has. Others are killed on drop.
+            // A process that stops with this one gets time to write its results. Others are killed on drop.
             drop(leash);
             let end = Instant::now() + saving;
             while Instant::now() < end && !matches!(lines.recv_timeout(POLL), Err(RecvTimeoutError::Disconnected)) {}
@@ -153,7 +153,7 @@ impl Drop for EndedOnDrop {
     }
 }
 
-/// Returns the lines of a source. A driver may print what is not text.
+/// Returns the lines of a source. A driver may print bytes that are no text.
 fn texts(source: impl Read) -> impl Iterator<Item = String> {
     let lines = BufReader::new(source).split(b'\n').map_while(Result::ok);
     lines.map(|line| String::from_utf8_lossy(&line).trim_end_matches('\r').to_owned())

@@ -40,7 +40,7 @@ impl Command {
     /// plus the number of a signal that asked to stop. Ends the process itself if the arguments can't be read.
     #[must_use]
     pub fn run(self) -> ExitCode {
-        // Whatever the arguments ask for: whoever wrote the program should see it.
+        // Before the arguments are read, so that the author of the program sees it in any case.
         if let Some(why) = self.refused {
             return exit::report(Err(anyhow::anyhow!("{why}")));
         }

@@ -1,4 +1,4 @@
-//! Where a report goes: checked before the minutes of measuring, with a second place if writing fails after them.
+//! The file of a report: checked before the minutes of measuring, with a second place if writing fails after them.
 
 use crate::output;
 use crate::outputs::check_writable;
@@ -8,7 +8,7 @@ use std::cell::Cell;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Where the report goes without `--out`.
+/// The file of the report without `--out`.
 const DEFAULT: &str = "report.json";
 
 /// The extension of a report that is being measured.

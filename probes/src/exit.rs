@@ -7,7 +7,7 @@ use std::process::ExitCode;
 pub(crate) enum Outcome {
     /// Exit status 0.
     Done,
-    /// Exit status 1, or that of a signal. The output says what failed.
+    /// Exit status 1, or that of a signal. The output shows the failure.
     Failed,
 }
 

@@ -1,10 +1,10 @@
-//! What makes a report that is there already worth measuring again.
+//! Flaws for which an existing report is measured again.
 
 use crate::revisions;
 use sapwise::Registry;
 use sapwise_lab::report::{Label, Report};
 
-/// Why a report is not worth keeping, whatever command it was measured by.
+/// Returns why a report is not worth keeping, whichever command measured it.
 pub(crate) fn flaw(report: &Report, registry: &Registry) -> Option<String> {
     let provenance = &report.provenance;
     if !provenance.optimised && !cfg!(debug_assertions) {

@@ -12,8 +12,8 @@ use sapwise_tune::{Hardware, Parameter};
 /// taken.
 ///
 /// A value that no machine has comes from other programs: the CPU is measured once more then. After Ctrl-C the
-/// parameters that were not measured are missing, with the reason. The hardware takes the parameters of the GPUs;
-/// whatever else is known of them is the second part of the answer.
+/// parameters that were not measured are missing, with the reason. The hardware holds the parameters of the GPUs; the
+/// second part of the answer holds all other results about them.
 ///
 /// # Errors
 /// When no process can be started, or this machine lacks a GPU that `--gpu` names.
@@ -48,7 +48,7 @@ fn measure_cpu(threads: Option<u32>) -> Hardware {
 /// Refuses hardware with a value that no machine has.
 ///
 /// # Errors
-/// Says that the machine is busy, and names the first such value.
+/// States that the machine is busy, and names the first such value.
 pub(crate) fn check_plausible(hardware: &Hardware) -> anyhow::Result<()> {
     match hardware.implausible() {
         None => Ok(()),

@@ -1,4 +1,4 @@
-//! Ctrl-C, SIGTERM and SIGHUP: the first signal asks the verb to stop and keep what it has, the second ends the
+//! Ctrl-C, SIGTERM and SIGHUP: the first signal asks the verb to stop and keep its results, the second ends the
 //! program.
 
 use anyhow::Context;
@@ -31,12 +31,12 @@ pub(crate) fn listen() -> anyhow::Result<()> {
     .context("Ctrl-C can't be caught")
 }
 
-/// Does what the first Ctrl-C does.
+/// Asks the verb to stop, as the first Ctrl-C does.
 pub(crate) fn request() {
     REQUESTED.store(true, SeqCst);
 }
 
-/// Whether the user asked to stop.
+/// Returns whether the user asked to stop.
 pub(crate) fn requested() -> bool {
     REQUESTED.load(SeqCst)
 }
@@ -47,7 +47,7 @@ pub(crate) fn exit_status() -> Option<u8> {
     (signal > 0).then_some(128 + signal)
 }
 
-/// An error when the user asked to stop, for verbs that have nothing to keep.
+/// Returns an error when the user asked to stop, for verbs that have nothing to keep.
 ///
 /// # Errors
 /// When a signal has come since [`listen`].
@@ -66,7 +66,7 @@ fn on_signal(mut caught: impl FnMut(u8) + Send + 'static) -> io::Result<()> {
     Ok(())
 }
 
-/// Whether the parent process had ignored a signal.
+/// Returns whether the parent process had ignored a signal.
 #[cfg(unix)]
 fn is_ignored(signal: libc::c_int) -> bool {
     let mut found = std::mem::MaybeUninit::<libc::sigaction>::zeroed();

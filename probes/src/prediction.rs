@@ -44,7 +44,7 @@ pub(crate) struct Slice {
 }
 
 impl Slice {
-    /// Returns the loads of a scenario, with its real pairs, up to as many objects as fit into memory.
+    /// Returns the loads of a scenario, with its real pairs, up to the largest size that fits into memory.
     ///
     /// # Errors
     /// On Ctrl-C, and when no size fits into memory.
@@ -109,8 +109,8 @@ pub(crate) fn predict(
     Ok(tuning)
 }
 
-/// Predicts the tuning of the machine of a report, or measures it from the timings of the report, with what is doubtful
-/// about either.
+/// Predicts the tuning of the machine of a report, or measures it from the timings of the report. Adds warnings about
+/// doubts of the report.
 ///
 /// # Errors
 /// When the model predicts none of the algorithms, or the report has too few timings.

@@ -1,4 +1,4 @@
-//! A progress bar on standard error for whatever takes over a second.
+//! A progress bar on standard error for work that takes over a second.
 
 use crate::{interrupt, output};
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
@@ -21,7 +21,7 @@ const TEMPLATE: &str = "{percent:>3} % {elapsed}{left}  {wide_msg}";
 
 /// A bar that shows itself after a second, and not at all when standard error is no terminal.
 ///
-/// When steps take unlike times, count milliseconds or bytes instead.
+/// If the steps take different times, count milliseconds or bytes instead.
 pub(crate) struct Progress {
     bar: ProgressBar,
     /// Shows the bar after the delay, unless the sender is gone by then.
@@ -29,7 +29,7 @@ pub(crate) struct Progress {
 }
 
 impl Progress {
-    /// A bar of that many steps.
+    /// Creates a bar of this number of steps.
     pub(crate) fn new(steps: u64) -> Self {
         let bar = ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::hidden());
         if let Ok(style) = ProgressStyle::with_template(TEMPLATE) {

@@ -30,7 +30,7 @@ pub(crate) fn provenance(arguments: &Probe, hardware: &Hardware, took: Duration)
     }
 }
 
-/// Returns what these limits and the environment take from the machine, if anything.
+/// Returns the restriction of the machine by these limits and the environment, if any.
 fn restriction(threads: Option<u32>, gpu_threads: Option<u32>) -> Option<Restriction> {
     let all = usable_cores();
     let mut kinds = Vec::new();
@@ -58,7 +58,7 @@ pub(crate) fn label(arguments: &Probe, points: &[Point], hardware: &Hardware) ->
     let fewer_cores = arguments.threads.is_some_and(|k| k < usable_cores());
     let lower_level = requested_level().is_some_and(|level| level < SimdLevel::detected());
     let loads: Vec<f64> = points.iter().filter_map(|p| p.foreign_load).collect();
-    // First: a restricted machine that is disturbed shows what no restriction explains.
+    // Contention comes first: the timings of a disturbed machine are not explained by its restriction.
     if median(&loads).is_some_and(|load| load > CONTENDED_LOAD) {
         Label::RealContended
     } else if on_software_gpu {

@@ -1,4 +1,4 @@
-//! Whether what a file says about algorithms holds for this build.
+//! Whether the algorithms of a file have the revisions of this build.
 
 use sapwise::algorithm::BackendClass;
 use sapwise::{AlgorithmId, Registry, Tuning};
@@ -16,7 +16,7 @@ pub(crate) fn stale_in_tuning(tuning: &Tuning, registry: &Registry) -> Vec<Strin
     stale(tuning.costs.iter().map(|c| (of(&c.algorithm), c.revision)), registry)
 }
 
-/// What a revision belongs to: a method on one class of processor.
+/// A method on one class of processor, which has one revision.
 pub(crate) type Key<'a> = (BackendClass, &'a str);
 
 pub(crate) fn of(id: &AlgorithmId) -> Key<'_> {

@@ -19,7 +19,7 @@ pub(crate) fn path(path: &Path) -> String {
 
 /// Returns the line that names the next command, from the words after the name of this program.
 ///
-/// `cargo run` sets `CARGO`: whoever came that way may not have installed the command.
+/// `cargo run` sets `CARGO`: a user who started the program with it may not have installed the command.
 pub(crate) fn next(words: &str) -> String {
     let own = std::env::current_exe().is_ok_and(|path| path.file_stem().is_some_and(|stem| stem == "sapwise"));
     let program = if own && std::env::var_os("CARGO").is_some() { "cargo run --release --" } else { "sapwise" };

@@ -1,4 +1,4 @@
-//! What people read at the end of a probe or a prediction.
+//! The text at the end of a probe or a prediction.
 
 use crate::gpus::GpuChoice;
 use crate::prediction::is_whole_slice;
@@ -39,7 +39,7 @@ pub(crate) fn report(report: &Report, terminal: Terminal) -> String {
     text
 }
 
-/// Returns what to do with a written report.
+/// Returns the file of a written report and the next command.
 pub(crate) fn next_step(report: &Report, path: &Path, gpus: &GpuChoice) -> String {
     let path = shell::path(path);
     // A report without a sweep, or one that was interrupted early, holds little but the hardware.
@@ -133,7 +133,7 @@ pub(crate) fn prediction(hardware: &Hardware, tuning: &Tuning, terminal: Termina
     text + &format!("{} {warning}\n", terminal.warning("warning:"))
 }
 
-/// Describes the steps of a slice, why there are no intervals, and what is doubtful.
+/// Describes the steps of a slice, why there are no intervals, and the warnings.
 pub(crate) fn tuning(tuning: &Tuning, terminal: Terminal) -> String {
     let mut text = steps(tuning, terminal, true);
     if !tuning.crossovers.iter().all(|b| b.interval().is_some()) {
@@ -145,8 +145,8 @@ pub(crate) fn tuning(tuning: &Tuning, terminal: Terminal) -> String {
     text
 }
 
-/// Describes the steps of a slice, with where each begins and the interval of that. Without `all`, leaves out a step
-/// that costs about the same as the one before it, wherever it begins.
+/// Describes the steps of a slice, each with its first size and the interval of that size. Without `all`, leaves out a
+/// step that costs about the same as the previous one over the whole slice.
 fn steps(tuning: &Tuning, terminal: Terminal, all: bool) -> String {
     let mut rows = Vec::new();
     for step in &tuning.steps {

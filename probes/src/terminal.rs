@@ -1,4 +1,4 @@
-//! What standard output can show: colours, or plain text.
+//! The style of standard output: colours, or plain text.
 
 use console::{Style, Term};
 use sapwise_lab::text::columns;
@@ -34,17 +34,17 @@ impl Terminal {
         self.styled(text, Style::new().bold())
     }
 
-    /// Styles what is as it should be.
+    /// Styles a good result.
     pub(crate) fn good(self, text: &str) -> String {
         self.styled(text, Style::new().green())
     }
 
-    /// Styles what the reader should know before relying on the rest.
+    /// Styles a warning.
     pub(crate) fn warning(self, text: &str) -> String {
         self.styled(text, Style::new().yellow())
     }
 
-    /// Styles what went wrong.
+    /// Styles a failure.
     pub(crate) fn bad(self, text: &str) -> String {
         self.styled(text, Style::new().red().bold())
     }

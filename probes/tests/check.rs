@@ -122,7 +122,7 @@ fn train_refuses_what_is_no_report() {
     assert!(!out.exists());
 }
 
-/// What is changed in a sound report, and what is said about it.
+/// The place and the value of a change in a sound report, and a part of the finding.
 type Case = (&'static str, Value, &'static str);
 
 /// The findings on sound reports, each with one thing changed, of a check that ends with this status.

@@ -48,7 +48,7 @@ fn verb(line: &str) -> &str {
     line.split(' ').nth(1).unwrap_or_default()
 }
 
-/// Runs a line if it is short; else only parses it, by `--help` after its words.
+/// Runs a line if it is short; otherwise only parses it, with `--help` after its words.
 fn run(line: &str, folder: &Path) -> String {
     let is_short = SHORT.contains(&verb(line)) || line.starts_with("sapwise predict --report");
     let line =

@@ -18,7 +18,7 @@ fn report(command: &mut assert_cmd::Command) -> sapwise_lab::Report {
     sapwise_lab::report::read(&success(command)).unwrap().value
 }
 
-/// A made-up report of a machine with two GPUs, with what `change` does to it. Enough points for a model.
+/// Writes a made-up report of a machine with two GPUs, changed by `change`. It has enough points for a model.
 fn made_up(folder: &Path, name: &str, change: impl Fn(&mut Value)) -> PathBuf {
     let mut report: Value =
         serde_json::from_str(include_str!("../../crates/lab/tests/fixtures/report-3-gpu.json")).unwrap();

@@ -19,7 +19,7 @@ use std::time::Instant;
 /// How often each verb is killed without `SAPWISE_KILLS`.
 const KILLS: u64 = 4;
 
-/// Fails where a file of ours is half-written, or holds a part of what it is named for.
+/// Fails if a file of ours is half-written or incomplete.
 fn check_whole(path: &Path) {
     let text = || fs::read_to_string(path).unwrap();
     let json = || drop(serde_json::from_str::<serde_json::Value>(&text()).unwrap_or_else(|e| panic!("{path:?}: {e}")));
@@ -37,7 +37,7 @@ fn check_whole(path: &Path) {
     }
 }
 
-/// The files below a folder, without what a killed program has left beside their places.
+/// Returns the files below a folder, without the temporary files of a killed program.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).unwrap().flatten() {
@@ -55,7 +55,7 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// What must hold after a command was ended by whatever it was.
+/// Checks the files after a command was ended early, for any reason.
 fn look(words: &[&str], out: &Path, before: &[PathBuf]) {
     let after = files(out);
     assert!(before.iter().all(|path| after.contains(path)), "{words:?}: {before:?} became {after:?}");
@@ -73,7 +73,7 @@ fn kill_and_look(words: &[&str], out: &Path, seed: u64) {
     let kills = std::env::var("SAPWISE_KILLS").map_or(KILLS, |n| n.parse().expect("SAPWISE_KILLS is a number"));
     let mut random = Random::new(seed);
     for k in 0..kills {
-        // Every other one near the end, where files are written.
+        // Every other kill comes near the end, when files are written.
         let share = if k % 2 == 0 { random.uniform() } else { 0.8 + 0.25 * random.uniform() };
         let mut command = program();
         command.args(words).current_dir(out).stdout(Stdio::null()).stderr(Stdio::null());
@@ -94,7 +94,7 @@ fn end_files_early(words: &[&str], out: &Path, before: &[PathBuf]) {
     let largest = before.iter().map(|path| fs::metadata(path).unwrap().len()).max().unwrap() as f64;
     for share in [0.0, 0.3, 0.6] {
         let mut command = Command::new("sh");
-        // Where the signal is not ignored it kills, which is the subject elsewhere. The limit is in blocks of 512
+        // The signal is ignored: otherwise it would kill, which other tests cover. The limit is in blocks of 512
         // bytes.
         command.args(["-c", "trap '' XFSZ; ulimit -f $0; exec \"$@\"", &((largest * share) as u64 / 512).to_string()]);
         command.arg(assert_cmd::cargo::cargo_bin!("sapwise"));
@@ -128,7 +128,7 @@ fn run_out_of_room(command: &mut Command) {
 #[cfg(not(unix))]
 fn end_files_early(_: &[&str], _: &Path, _: &[PathBuf]) {}
 
-/// A folder with two reports, and one in it for what the command writes.
+/// Makes a folder with two reports, and one in it for the output of the command.
 fn folders() -> (tempfile::TempDir, PathBuf, [String; 2]) {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");

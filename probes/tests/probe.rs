@@ -26,13 +26,13 @@ fn a_probe_writes_a_report_that_reads_back_with_every_parameter_and_point() {
     let report = read(&out);
     let names: Vec<&str> = report.hardware.parameters.iter().map(|p| p.name.as_str()).collect();
     assert_eq!(names, ParameterId::ALL);
-    // What lies close is visited again after the ascent, and between the two.
+    // Sizes with similar times are visited again after the ascent, and so is a size between them.
     let sizes: Vec<u32> = report.points.iter().map(|p| p.load.objects).collect();
     assert!(sizes[..2] == [10, 20] && sizes.iter().all(|n| (10..=20).contains(n)), "{sizes:?}");
     assert!(report.points.iter().all(|p| p.timings.iter().all(|t| t.samples_ns.len() >= 3)));
     assert_eq!(report.provenance.command, "probe --seed 9 --max-objects 20 --scenario uniform");
     assert_eq!(report.provenance.seed, 9);
-    // Nothing but what a machine that others use says of itself.
+    // Only the remarks of a machine that other programs use.
     assert_eq!(report.remarks, report.hardware.disturbed());
     assert_eq!(report.provenance.optimised, !cfg!(debug_assertions));
     // One point a line, so that a report can be read and compared by people.

@@ -1,4 +1,4 @@
-//! `sapwise probe --profiles`: what it lists, what it refuses, and how it continues.
+//! `sapwise probe --profiles`: its list, its refusals, and how it continues.
 
 mod common;
 
@@ -58,7 +58,7 @@ fn after_an_interrupt_the_same_command_continues() {
     };
     until("full.json");
     let full = folder.path().join("full.json");
-    // Whatever else runs beside this test must not decide whether other programs disturbed the report.
+    // The label must not depend on programs that run beside this test.
     let label = |label: &str| {
         let mut report: serde_json::Value = serde_json::from_str(&fs::read_to_string(&full).unwrap()).unwrap();
         report["label"] = label.into();
@@ -74,6 +74,6 @@ fn after_an_interrupt_the_same_command_continues() {
     until(&format!("{second}.json"));
     assert_eq!(fs::read(&full).unwrap(), before, "a complete report was replaced");
     assert!(success(tiny(folder.path()).arg("--dry-run")).contains("complete"));
-    // Another command must not replace what this one has measured.
+    // Another command must not replace the reports of this one.
     failure(tiny(folder.path()).args(["--seed", "2"]), 1, &["another command"]);
 }

@@ -9,12 +9,12 @@ use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Tuning that run the first algorithm below that many objects and the second from there on.
+/// Writes a tuning that runs the first algorithm below a number of objects and the second from there on.
 fn steps(folder: &Path, first: &str, crossover: u32, second: &str) -> PathBuf {
     write(folder, "steps.json", tuning(&[(0, first), (crossover, second)]).to_string())
 }
 
-/// Tuning with the costs of `grid-sap` on one thread, and on so many.
+/// Writes a tuning with the costs of `grid-sap` on one thread and on `threads`.
 fn costs(folder: &Path, threads: u32) -> PathBuf {
     let (one, many) = ("grid-sap@cpu1".to_owned(), format!("grid-sap@cpu{threads}"));
     let devices: Value = answer(sapwise().args(["devices", "--no-gpus", "--json"]));
@@ -51,7 +51,7 @@ fn a_recorded_scene_is_run_and_searched_like_the_scene() {
     assert!(again["switches"].as_u64().unwrap() > 0, "{again}");
     let few = answer(&mut run(&stream, &tuning, &["--repeats", "1", "--frames", "7", "--json"]));
     assert_eq!((&few["frames"], &few["parts"]), (&7.into(), &json!([])));
-    // `pairs` sees as many boxes in each frame: none of the absent ones has a pair, or is refused.
+    // `pairs` takes the same stream: absent boxes have no pairs and are not refused.
     let pairs = answer(sapwise().arg("pairs").arg(&stream).arg("--json"));
     assert_eq!((&pairs["frames"], &pairs["objects"]), (&90.into(), &recorded["objects"]["max"]));
 }
@@ -154,7 +154,7 @@ fn what_can_not_be_run_is_refused_with_what_to_do() {
         (file("broken.npy", "2, 1, 6", &[good, broken]), &[], 1, &["broken.npy", "frame 1", "box 0", "NaN"]),
         (file("none.npy", "0, 5, 6", &[]), &[], 1, &["none.npy has no frames", "--record"]),
         (folder.path().join("absent.npy"), &[], 1, &["absent.npy"]),
-        // A file that exists is a stream, whatever its name.
+        // An existing file is a stream, whatever its name is.
         ("Cargo.toml".into(), &[], 1, &["Cargo.toml"]),
         ("unifrom".into(), &[], 2, &["no scenario", "uniform", "name a file of boxes"]),
         (scene.clone(), &["--frames", "3"], 2, &["--frames 3", "2 frames"]),

@@ -1,4 +1,4 @@
-//! What a terminal shows, and what a pipe gets.
+//! The output on a terminal and through a pipe.
 
 mod common;
 

@@ -54,7 +54,7 @@ fn clash() -> ExitCode {
         .run()
 }
 
-/// A program whose algorithm finds as many pairs as it has threads, whatever the boxes.
+/// A program whose algorithm finds one pair for each of its threads, whatever the boxes are.
 fn on_threads() -> ExitCode {
     struct Threads(u32);
     impl BroadPhase for Threads {
@@ -125,7 +125,7 @@ fn from_the_probe_to_the_run_as_one_of_ours() {
         let words = ["predict", "--json", "--report"];
         answer(command.args(words).arg(&report).arg("--model").arg(&model).arg("--out").arg(&tuning))
     };
-    // The plain command predicts the library's algorithms, and says what it can't choose.
+    // The plain command predicts the library's algorithms, and warns about the one that it lacks.
     let plain = predict(sapwise());
     assert!(!plain["costs"].to_string().contains("sweep"), "{plain}");
     let warned = plain["warnings"].to_string().contains("knows sweep, which is not in this build");
@@ -164,7 +164,7 @@ fn the_pairs_are_those_of_ours() {
     let mut boxes: Vec<[f32; 6]> = (0..9).map(|k| k as f32).map(|x| [x, 0.0, 0.0, x + 1.0, 1.0, 1.0]).collect();
     boxes.extend([[3.0; 6], [-inf, -inf, -inf, inf, inf, inf], [-inf, 0.0, 0.0, 4.5, inf, inf]]);
     boxes.extend([[1e30, 0.0, 0.0, 2e30, 1.0, 1.0], [3e30, 0.0, 0.0, 4e30, 1.0, 1.0], [4e30, 1.0, 0.0, inf, 1.0, 1.0]]);
-    // The same elsewhere, in another order, then where they were.
+    // The same boxes elsewhere in another order, and then in their first places.
     let away: Vec<[f32; 6]> = boxes.iter().rev().map(|b| b.map(|x| x + 50.0)).collect();
     let near: Vec<[f32; 6]> = boxes.iter().map(|b| b.map(|x| x + 0.25)).collect();
     let frames = [boxes.concat(), near.concat(), away.concat(), boxes.concat()];

@@ -1,4 +1,4 @@
-//! Trains on all reports of a folder but those of one machine, and prints what choices cost on one of its reports.
+//! Trains on all reports of a folder but those of one machine, and prints the regret of choices on one of its reports.
 //!
 //! ```text
 //! cargo run --release -p sapwise-lab --example leave_one_out -- datasets amd-epyc-zen3-2c/full.json
@@ -20,8 +20,8 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// The regret on a report of the model that was trained without its machine, and of each algorithm when it is chosen
-/// always.
+/// Returns the regret on a report: of the model that was trained without its machine, and of always choosing each
+/// algorithm.
 pub(crate) fn leave_one_out(folder: &Path, file: &str) -> Result<String> {
     let reports = read_reports(&[folder.to_owned()], &Silent)?;
     let (profiles, _) = Selection::of(&reports).finish();

@@ -1,4 +1,4 @@
-//! Which reports are of one kind, and how far the times of such repeats agree.
+//! Reports of one kind, and how far their times agree.
 
 use crate::data::host;
 use crate::report::{Label, Report};
@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[non_exhaustive]
 pub struct Kind {
-    /// CPU model, caches and host clock, as [`host`] tells them apart.
+    /// Identity by CPU model, caches and host clock, from [`host`].
     pub host: String,
     /// Name of the CPU.
     pub cpu: String,
@@ -22,12 +22,12 @@ pub struct Kind {
     pub simd: String,
     /// Names of the GPUs.
     pub gpus: Vec<String>,
-    /// Threads of a software adapter, where they were set.
+    /// Threads of a software adapter, if they were set.
     pub gpu_threads: Option<u32>,
 }
 
 impl Kind {
-    /// The kind of a report.
+    /// Returns the kind of a report.
     pub fn of(report: &Report) -> Self {
         let (hardware, provenance) = (&report.hardware, &report.provenance);
         let cores = provenance.threads.or_else(|| hardware.value(ParameterId::UsableCores).map(|cores| cores as u32));
@@ -42,8 +42,8 @@ impl Kind {
     }
 }
 
-/// Returns why a report can't stand for the machines of its kind: it is published, was cut short, has
-/// gaps or was disturbed.
+/// Returns why a report can't represent the machines of its kind: it is published, was cut short, has gaps or was
+/// disturbed.
 pub fn unusable(report: &Report) -> Option<&'static str> {
     if report.label == Label::Published {
         Some("it holds published parameters")
@@ -75,7 +75,7 @@ pub struct Agreement {
 }
 
 impl Times {
-    /// The times of a report.
+    /// Returns the times of a report.
     pub fn of(report: &Report) -> Self {
         let mut samples: BTreeMap<(String, u32, AlgorithmId), Vec<f64>> = BTreeMap::new();
         for point in &report.points {
@@ -87,7 +87,7 @@ impl Times {
         Self(samples.into_iter().filter_map(|(key, ns)| Some((key, median(&ns)?))).collect())
     }
 
-    /// Compares these times with those of other reports; `None` where none of them timed the same.
+    /// Compares these times with those of other reports. `None` if the others share no timing with it.
     pub fn over(&self, others: &[&Self]) -> Option<Agreement> {
         let ratio = |(key, ns): (&(String, u32, AlgorithmId), &f64)| {
             let theirs: Vec<f64> = others.iter().filter_map(|other| other.0.get(key).copied()).collect();

@@ -1,8 +1,8 @@
-//! What the label of a report says to a reader.
+//! Labels of reports as text.
 
 use crate::report::Label;
 
-/// The label as it stands in the file.
+/// Returns the label as it is written in files.
 pub fn kind(label: Label) -> &'static str {
     match label {
         Label::RealFull => "real_full",
@@ -14,7 +14,7 @@ pub fn kind(label: Label) -> &'static str {
     }
 }
 
-/// What the label means.
+/// Returns the meaning of a label.
 pub fn meaning(label: Label) -> &'static str {
     match label {
         Label::RealFull => "a whole machine, undisturbed",

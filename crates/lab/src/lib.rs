@@ -1,12 +1,12 @@
-//! What follows from reports: cost models, their validation on machines held out, studies, figures and pages.
+//! The evaluation of reports: cost models, their validation on held-out machines, studies, figures and pages.
 //!
-//! A [`report`](report::Report) holds what was measured on one machine. The way from reports to a model is
+//! A [`report`](report::Report) holds the measurements of one machine. The steps from reports to a model are
 //!
-//! 1. [`data`]: a report becomes a [`Profile`](data::Profile), and a [`Selection`](data::Selection) of them what can
-//!    be trained on;
+//! 1. [`data`]: a report becomes a [`Profile`](data::Profile), and a [`Selection`](data::Selection) keeps the profiles
+//!    that can be trained on;
 //! 2. [`fit`]: cost terms are fitted to the profiles, which makes a [`Model`](sapwise_tune::Model);
 //! 3. [`evaluate`]: each machine is held out in turn, and every strategy is judged on it by its regret;
-//! 4. [`train()`]: all of it, with what [`Training`] says of itself.
+//! 4. [`train()`]: all of these steps; [`Training`] describes the result.
 //!
 //! ```no_run
 //! use sapwise_lab::data::{Selection, read_reports};

@@ -1,4 +1,4 @@
-//! The model card: what a model was trained on and how well it did.
+//! The model card: the training reports of a model, and its scores.
 
 use crate::label_text::kind;
 use crate::spread::percent;
@@ -13,10 +13,10 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Method and use, the same for every model.
 const USE: &str = include_str!("model_card/use.md");
 
-/// What the terms on GPUs are.
+/// Explanation of the terms on GPUs.
 const GPUS: &str = include_str!("model_card/gpus.md");
 
-/// What the columns of the scores mean, and what the strategies are.
+/// Explanation of the columns of the scores and of the strategies.
 const SCORES: &str = include_str!("model_card/scores.md");
 
 /// Returns the model card as a page of Markdown, with the notes of the training.
@@ -41,7 +41,7 @@ pub fn page(model: &Model, training: &Training, notes: &[String]) -> String {
     text
 }
 
-/// Returns what the model knows of GPUs.
+/// Describes the GPUs of the training.
 fn gpus(methods: &[&MethodModel]) -> String {
     if methods.is_empty() {
         return " Not for GPUs.\n".to_owned();
@@ -89,7 +89,7 @@ fn ranges(model: &Model, published: Option<&PublishedShares>) -> String {
     format!("{text}\n\n{}", markdown(&rows))
 }
 
-/// Returns how far predictions may be off.
+/// Describes how far predictions may be off.
 fn intervals(validation: &Validation) -> String {
     let Some(c) = validation.coverage else {
         return "None: fewer than two hosts were held out.\n".to_owned();
@@ -106,12 +106,12 @@ fn intervals(validation: &Validation) -> String {
     )
 }
 
-/// Over all sizes and, in parentheses, weighted as in games.
+/// Formats a regret over all sizes and, in parentheses, weighted as in games.
 fn regrets(regrets: Option<Regrets>) -> String {
     regrets.map_or_else(|| "-".to_owned(), |r| format!("{:.1} % ({:.1})", 100.0 * r.all, 100.0 * r.in_games))
 }
 
-/// Returns what was held out, and the scores as a table that `draw` draws.
+/// Describes the held-out data, and the scores as a table that `draw` draws.
 pub fn scores(validation: &Validation, draw: impl FnOnce(&[Vec<String>]) -> String) -> String {
     let Validation { held_out, physical_machines, cpu_models, profiles, methods, floor, .. } = validation;
     let of_models = format!("{} of {}", count(*physical_machines, "physical machine"), count(*cpu_models, "CPU model"));
@@ -120,7 +120,8 @@ pub fn scores(validation: &Validation, draw: impl FnOnce(&[Vec<String>]) -> Stri
         return format!("{data}; not validated.\n");
     }
     let doubt = if *physical_machines < 2 { " This says little about machines never seen." } else { "" };
-    let head = "strategy, unseen scenario, seen scenario, least to largest, one thread, several, by means, crossovers off by,                 over 10 %";
+    let head = "strategy, unseen scenario, seen scenario, least to largest, one thread, several, by means, crossovers \
+                off by, over 10 %";
     let mut rows: Vec<Vec<String>> = vec![head.split(", ").map(str::to_owned).collect()];
     for m in methods {
         let seen = Regrets { all: m.mean_regret, in_games: m.mean_regret_in_games.unwrap_or_default() };

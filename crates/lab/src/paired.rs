@@ -1,7 +1,7 @@
 //! Two algorithms side by side over the number of objects, from timings of both on the same frames.
 //!
-//! At each size the median over frames of `ln(first / second)` is taken: pairing frame by frame cancels what disturbed
-//! both.
+//! At each size the median over frames of `ln(first / second)` is taken: pairing frame by frame cancels disturbances
+//! that hit both.
 
 use sapwise_tune::stats::{NORMAL_90, mean, median, robust_deviation};
 use std::collections::BTreeMap;
@@ -51,22 +51,23 @@ pub(crate) struct Crossing {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Size {
     ln_objects: f64,
-    /// Above zero where the second algorithm is cheaper.
+    /// Above zero if the second algorithm is cheaper.
     ratio_ln: f64,
     error_ln: f64,
 }
 
 impl Size {
-    /// Of the ratios at each point of one size, with their standard errors over the frames.
+    /// Combines the ratios at each point of one size, given with their standard errors over the frames.
     fn of(objects: u32, points: &[(f64, f64)]) -> Self {
         let (ratios, errors): (Vec<f64>, Vec<f64>) = points.iter().copied().unzip();
-        // What changed between two points shows in neither's frames.
+        // A change between two points does not show in the frames of either.
         let between = robust_deviation(&ratios).unwrap_or(0.0) * MEDIAN_OVER_MEAN;
         let error_ln = mean(&errors).hypot(between) / (points.len() as f64).sqrt();
         Self { ln_objects: f64::from(objects).ln(), ratio_ln: median(&ratios).unwrap_or(0.0), error_ln }
     }
 
-    /// The ratio in units of what is told from zero at that quantile: -1 or less where the first is distinctly cheaper.
+    /// Returns the ratio over the least ratio that differs from zero at that quantile: -1 or less if the first
+    /// algorithm is distinctly cheaper.
     fn told(&self, quantile: f64) -> f64 {
         self.ratio_ln / (quantile * self.error_ln).max(LEAST_LN)
     }
@@ -95,13 +96,13 @@ impl PairedRatio {
         (sizes.len() >= 3).then_some(Self { sizes })
     }
 
-    /// Whether the first algorithm is cheaper on average over the sizes.
+    /// Returns whether the first algorithm is cheaper on average over the sizes.
     pub(crate) fn first_is_cheaper(&self) -> bool {
         self.sizes.iter().map(|s| s.ratio_ln).sum::<f64>() < 0.0
     }
 
-    /// The crossings, ascending: each lies between two sizes of which the first algorithm is distinctly cheaper at one
-    /// and the second at the other.
+    /// Returns the crossings, ascending. Each lies between two sizes of which the first algorithm is distinctly
+    /// cheaper at one and the second at the other.
     pub(crate) fn crossings(&self) -> Vec<Crossing> {
         let mut found = Vec::new();
         let mut last: Option<usize> = None;
@@ -116,7 +117,7 @@ impl PairedRatio {
         found
     }
 
-    /// The middle one of the roots between two sizes at which opposite algorithms are cheaper.
+    /// Returns the middle one of the roots between two sizes at which opposite algorithms are cheaper.
     fn crossing(&self, from: usize, to: usize) -> Crossing {
         let pairs = self.sizes[from..=to].windows(2);
         let roots: Vec<f64> = pairs
@@ -126,9 +127,9 @@ impl PairedRatio {
         Crossing { objects: roots[roots.len() / 2].exp(), first_below: self.sizes[from].ratio_ln < 0.0 }
     }
 
-    /// The 90 % interval of a crossover at `objects`, below which the first algorithm is the cheaper one: from where
-    /// that is distinct to where it is distinct that the second one is, or to the smallest or largest size. `None` for
-    /// a crossover beyond the sizes.
+    /// Returns the 90 % interval of a crossover at `objects`, below which the first algorithm is the cheaper one: from
+    /// the last size at which the first is distinctly cheaper, or the smallest size, to the first size at which the
+    /// second is, or the largest size. `None` for a crossover beyond the sizes.
     pub(crate) fn interval(&self, objects: f64) -> Option<(f64, f64)> {
         let at = objects.ln();
         let (first, last) = (self.sizes.first()?, self.sizes.last()?);
@@ -136,7 +137,7 @@ impl PairedRatio {
             return None;
         }
         let told: Vec<f64> = self.sizes.iter().map(|size| size.told(NORMAL_90)).collect();
-        // Where the ratio becomes distinct on the way from one size to the next, which is distinct.
+        // The size at which the ratio becomes distinct, between one size and the next, distinct one.
         let edge = |within: usize, beyond: usize| {
             let (from, to) = (told[within], told[beyond].signum());
             let share = if from * to >= 1.0 { 0.0 } else { (to - from) / (told[beyond] - from) };
@@ -166,8 +167,8 @@ mod tests {
     use super::*;
     use sapwise_scenes::Random;
 
-    /// Two passes over 21 sizes, five frames each, of two algorithms whose ratio is `(n / 1000) ^ exponent` with 3 % of
-    /// noise.
+    /// Two passes over 21 sizes, five frames each, of two algorithms whose ratio is `(n / 1000) ^ exponent` with 3 %
+    /// of noise.
     fn crossing_at_1000(exponent: f64, seed: u64) -> PairedRatio {
         let mut random = Random::named(seed, &[]);
         let mut noisy = |ns: f64| (1e6 * ns * (0.03 * random.normal()).exp()) as u64;

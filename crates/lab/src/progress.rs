@@ -5,16 +5,16 @@
 #[error("interrupted before the end; there is no result")]
 pub struct Interrupted;
 
-/// Receives the progress of long work, and ignores what it does not define. Work of several parts starts each with its
-/// own number of steps.
+/// Receives the progress of long work. Methods that are not defined do nothing. Work of several parts starts each part
+/// with its own number of steps.
 pub trait Progress: Sync {
-    /// Begins a part of that many steps.
+    /// Begins a part of this number of steps.
     fn start(&self, _steps: u64) {}
 
     /// Adds finished steps of the part. Called from several threads.
     fn advance(&self, _steps: u64) {}
 
-    /// Says what the work is doing.
+    /// Shows a description of the current work.
     fn message(&self, _text: &str) {}
 
     /// Warns the user; the work goes on. Called from several threads.

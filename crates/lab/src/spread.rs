@@ -1,12 +1,12 @@
-//! A mean beside the least and the largest that it is the mean of: alone it hides how far they differ.
+//! A mean beside the least and the largest value, since a mean alone hides how far the values differ.
 
-/// The least and the largest of some values; `None` of none.
+/// Returns the least and the largest of some values; `None` without values.
 pub fn range(values: &[f64]) -> Option<[f64; 2]> {
     let least = values.iter().copied().min_by(f64::total_cmp)?;
     Some([least, values.iter().copied().max_by(f64::total_cmp)?])
 }
 
-/// A mean share with its range as percentages: `5.0 % (0.2 to 31.0)`, or `5.0 %` where the range is not known.
+/// Formats a mean share with its range as percentages: `5.0 % (0.2 to 31.0)`, or `5.0 %` if the range is unknown.
 pub fn percent(mean: f64, range: Option<[f64; 2]>, decimals: usize) -> String {
     let [mean, least, largest] = [mean, range.map_or(mean, |r| r[0]), range.map_or(mean, |r| r[1])].map(|v| 100.0 * v);
     match range {

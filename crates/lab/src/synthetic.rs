@@ -138,8 +138,8 @@ impl Machine {
         hardware
     }
 
-    /// A full sweep: 23 sizes from 16 to 700 000 objects of two scenarios; from 500 objects up whoever is eight times
-    /// slower than the best leaves the race, on a GPU only whoever doesn't gain.
+    /// A full sweep: 23 sizes from 16 to 700 000 objects of two scenarios; from 500 objects on, an
+    /// algorithm at eight times the best leaves the race, unless it runs on a GPU and gains.
     pub(crate) fn report(&self) -> Report {
         let hardware = self.hardware();
         let mut random = Random::named(u64::from(self.cores) * 1000 + self.ghz.to_bits() % 997, &[]);
@@ -237,8 +237,8 @@ fn method(name: &str, backend: BackendClass, terms: &[(Term, Scale, f64)]) -> Me
     method
 }
 
-/// The costs on GPUs that the reports are made from: those that are counted, each dearer than the hardware parameters
-/// say.
+/// Returns the costs on GPUs that the reports are made from: the counted ones, each higher than by the hardware
+/// parameters.
 pub(crate) fn gpu_truth() -> Vec<MethodModel> {
     let truth = |name: &str, operations: f64| {
         let dearer = |term, scale| match (scale, term) {
@@ -258,7 +258,7 @@ pub(crate) fn gpu_truth() -> Vec<MethodModel> {
     vec![truth("brute", 12.0), truth("sap", 15.0), truth("grid-sap", 300.0)]
 }
 
-/// The costs on the CPU that the reports are made from.
+/// Returns the costs on the CPU that the reports are made from.
 pub(crate) fn truth() -> Vec<MethodModel> {
     use {Scale::*, Term::*};
     let method = |name: &str, terms: &[(Term, Scale, f64)]| {
@@ -305,7 +305,7 @@ pub(crate) fn truth() -> Vec<MethodModel> {
     ]
 }
 
-/// What the algorithms of a machine cost in truth, in the order of their ids.
+/// Returns the true costs of the algorithms of a machine, in the order of their ids.
 pub(crate) fn true_costs(machine: &Hardware, ids: &[AlgorithmId]) -> Vec<AlgorithmCost> {
     let entries: Vec<Entry> = ids.iter().map(|id| Entry::new(id.clone(), 1)).collect();
     let model = Model::new("truth", [truth(), gpu_truth()].concat(), Vec::new());

@@ -1,6 +1,6 @@
 //! Text in columns.
 
-/// Rows with every column but the last padded to its widest cell, two blanks between columns.
+/// Draws rows with every column but the last padded to its widest cell, two blanks between columns.
 pub fn columns(rows: &[Vec<String>]) -> String {
     let count = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |row: &Vec<String>, column: usize| row.get(column).map_or(0, |cell| cell.chars().count());
@@ -34,12 +34,12 @@ pub(crate) fn position_or_push<T: PartialEq>(list: &mut Vec<T>, value: T) -> usi
     })
 }
 
-/// A number of things, with the plural of their name but for one.
+/// Writes a number of things: `1 host`, `2 hosts`.
 pub fn count(number: usize, thing: &str) -> String {
     format!("{number} {thing}{}", if number == 1 { "" } else { "s" })
 }
 
-/// A whole number with a blank between groups of three digits.
+/// Writes a whole number with a blank between groups of three digits.
 pub fn grouped(number: u64) -> String {
     let digits = number.to_string();
     let mut text = String::new();

@@ -13,16 +13,16 @@ use sapwise_tune::Model;
 pub struct Trained {
     /// The model, fitted to all reports.
     pub model: Model,
-    /// What it was trained on, and how well models of its kind did on held-out machines.
+    /// Its training reports, and how well models of its kind did on held-out machines.
     pub training: Training,
-    /// Sentences on what was left out and why, and on what the validation does not say.
+    /// Sentences about reports and methods that were left out, and about the limits of the validation.
     pub notes: Vec<String>,
-    /// Regrets and crossovers of what was held out.
+    /// Regrets on held-out machines, and their crossovers.
     pub held_out: HeldOut,
 }
 
-/// Fits a model to all profiles but those that are held out together with that of `file`, and returns it with what
-/// these are.
+/// Fits a model to all profiles except those that are held out together with that of `file`. Returns it with a name
+/// for the held-out part, such as `physical machine`.
 ///
 /// # Errors
 /// When there are no others, or no model can be fitted to them.

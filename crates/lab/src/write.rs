@@ -18,7 +18,7 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> Resul
     let result = match fs::metadata(path) {
         Ok(found) if found.is_dir() => Err(anyhow!("it is a folder")),
         Ok(found) if !found.is_file() => write_through(path, write),
-        // Through a link to the file it names; where that can't be told, as for a file not yet there, the path itself.
+        // A link is resolved to its file. A file that does not exist yet is written to the path itself.
         _ => replace(&fs::canonicalize(path).unwrap_or_else(|_| path.to_owned()), write),
     };
     result.with_context(|| format!("can't write {}", path.display()))
@@ -32,15 +32,15 @@ pub fn write_text(path: &Path, text: &str) -> Result<()> {
     write_atomically(path, |out| Ok(out.write_all(text.as_bytes())?))
 }
 
-/// What the names of files begin and end with that are there until they are moved to their place.
+/// Prefix and suffix of temporary files.
 const TEMPORARY: [&str; 2] = [".sapwise-", ".tmp"];
 
-/// Whether a file is called as those are that [`write_atomically`] makes until they are whole.
+/// Returns whether a file name is that of a temporary file of [`write_atomically`].
 pub(crate) fn is_temporary(name: &OsStr) -> bool {
     name.to_str().is_some_and(|name| name.starts_with(TEMPORARY[0]) && name.ends_with(TEMPORARY[1]))
 }
 
-/// Of the error its kind alone: its text names the temporary file, of which the user knows nothing.
+/// Keeps the kind of the error only: its text names the temporary file, which the user does not know.
 fn refused(folder: &Path, error: &io::Error) -> anyhow::Error {
     anyhow!("no file can be made in {}: {}", folder.display(), io::Error::from(error.kind()))
 }
@@ -56,7 +56,7 @@ fn replace(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()>) -> Res
     }
     let mut builder = tempfile::Builder::new();
     builder.prefix(TEMPORARY[0]).suffix(TEMPORARY[1]);
-    // Private otherwise, where every other program's files follow the umask.
+    // By default the file would be private; files of other programs follow the umask.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let mut temporary = builder.tempfile_in(&folder).map_err(|e| refused(&folder, &e))?;

@@ -1,4 +1,5 @@
-//! Every report in the repository is sound and current, its label is true, and the built-in model predicts its machine.
+//! Every report in the repository is sound and current, its label is true, and the built-in model predicts its
+//! machine.
 
 use sapwise::Registry;
 use sapwise::algorithm::Entry;
@@ -27,7 +28,7 @@ fn training() -> Training {
     read_model(&std::fs::read_to_string(repository("models/default.json")).unwrap()).unwrap().training
 }
 
-/// Our algorithms on a machine of that many cores.
+/// Returns our algorithms on a machine with this number of cores.
 fn algorithms(cores: u32) -> Vec<Entry> {
     Registry::with_cores(cores).entries().to_vec()
 }
@@ -57,7 +58,7 @@ fn every_report_is_complete_and_its_label_is_true() {
                 point.timings.iter().filter(|t| t.error.is_none()).map(|t| t.samples_ns.len()).collect();
             assert!(samples.iter().all(|n| (3..=40).contains(n)), "{path}: {samples:?} samples in {}", point.scenario);
         }
-        // What was written is what is read, to the last digit.
+        // A report reads back to the last digit.
         assert!(report::read(&report::write(&report).unwrap()).unwrap().value == report, "{path}");
     }
 }

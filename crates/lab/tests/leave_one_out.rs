@@ -1,4 +1,4 @@
-//! The example for researchers does what it says.
+//! The example for researchers works.
 
 #[path = "../examples/leave_one_out.rs"]
 mod example;

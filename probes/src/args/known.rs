@@ -9,7 +9,7 @@ use std::ops::RangeInclusive;
 
 /// Lists the scenarios in the help, but keeps the errors of the parser, which say more than "not in the list".
 #[derive(Clone)]
-struct Scenarios<P>(P);
+pub(super) struct Scenarios<P>(pub(super) P);
 
 impl<P: TypedValueParser> TypedValueParser for Scenarios<P> {
     type Value = P::Value;
@@ -34,9 +34,4 @@ pub(super) fn whole(range: RangeInclusive<u32>) -> impl TypedValueParser<Value =
 /// Parses a scenario.
 pub(super) fn scenario() -> impl TypedValueParser<Value = Scenario> {
     Scenarios(|text: &str| text.parse::<Scenario>())
-}
-
-/// Parses a value that may be a scenario.
-pub(super) fn scenario_or<P: TypedValueParser>(parser: P) -> impl TypedValueParser<Value = P::Value> {
-    Scenarios(parser)
 }

@@ -24,7 +24,7 @@ Examples:
 pub(crate) struct Run {
     /// The scenario; or a stream: an .npy file of 32-bit floats of shape frames x n x 6, each row a box: min x y z,
     /// max x y z. Rows of NaN at the end of a frame are absent boxes.
-    #[arg(value_name = "SCENARIO|BOXES.npy", value_parser = known::scenario_or(|text: &str| text.parse::<Scene>()))]
+    #[arg(value_name = "SCENARIO|BOXES.npy", value_parser = known::Scenarios(|text: &str| text.parse::<Scene>()))]
     pub(crate) scene: Scene,
     /// A tuning file, or a report to compute a tuning from [default: predict from this machine's hardware].
     #[arg(long, value_name = "T.json")]

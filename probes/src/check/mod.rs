@@ -18,7 +18,7 @@ use std::path::Path;
 
 pub(crate) use report::{doubts, hardware_doubts};
 
-/// What is known about one file.
+/// The result of the check of one file.
 #[derive(Debug, Default, Serialize)]
 pub(crate) struct Finding {
     pub(crate) file: String,
@@ -30,11 +30,11 @@ pub(crate) struct Finding {
     pub(crate) current: Option<bool>,
     /// It may be used on this machine. `None` when that could not be looked at.
     pub(crate) applicable: Option<bool>,
-    /// What makes the file fail.
+    /// Problems, for which the file fails.
     pub(crate) problems: Vec<String>,
     /// Why its figures should not be relied on, though it is readable and complete.
     pub(crate) doubts: Vec<String>,
-    /// What else the user should know.
+    /// Other information for the user.
     pub(crate) notes: Vec<String>,
     /// The kind of a report.
     #[serde(skip)]
@@ -44,7 +44,7 @@ pub(crate) struct Finding {
     pub(crate) times: Option<Times>,
 }
 
-/// What files are checked against.
+/// The build and the machine that files are checked against.
 pub(crate) struct Here {
     registry: Registry,
     machine: Machine,
@@ -61,7 +61,7 @@ impl Here {
     /// Reads a file and checks it.
     pub(crate) fn look_at(&self, path: &Path) -> Finding {
         let mut finding = Finding { file: path.display().to_string(), ..Finding::default() };
-        // A note and not a line on standard error, so that it stands with its file.
+        // As a note instead of a line on standard error, so that it appears with its file.
         let newer = RefCell::new(Vec::new());
         let read = read_document(path, &|text| newer.borrow_mut().push(text.to_owned()));
         finding.notes.extend(newer.into_inner());

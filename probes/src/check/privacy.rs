@@ -2,10 +2,10 @@
 
 use sapwise_lab::report::Report;
 
-/// The beginnings of folders that are named after whoever works in them, in lower case.
+/// The beginnings of folders that are named after a user, in lower case.
 const FOLDERS: [&str; 4] = ["/home/", "/root/", "/users/", "\\users\\"];
 
-/// Shorter names of hosts are words that stand anywhere.
+/// Shorter names of hosts may appear as ordinary words.
 const SHORTEST_HOST: usize = 4;
 
 /// Returns one sentence for each free text that names a folder of a user or this host. A host may be called like its

@@ -20,8 +20,8 @@ const IMPOSSIBLE_SCALING: f64 = 2.0;
 /// Share of points with foreign load above which a report is doubtful.
 const DISTURBED_SHARE: f64 = 0.25;
 
-/// A latency between cores beyond this factor of the usual one is that of another placement of the cores, and the share
-/// of points with one above which a report says so.
+/// A latency between cores beyond this factor of the usual one is that of another placement of the cores, and the
+/// share of points with one above which a report says so.
 const MOVED: f64 = 1.5;
 const MOVED_SHARE: f64 = 0.1;
 
@@ -52,7 +52,7 @@ impl Here {
         finding.notes.extend(remarks.map(|r| format!("remark: {r}")));
     }
 
-    /// How the GPUs that a report has timings of differ from those of this machine.
+    /// Returns how the GPUs that a report has timings of differ from those of this machine.
     fn other_gpus(&self, report: &Report) -> Vec<String> {
         let timed: BTreeSet<u32> = report.algorithms.iter().flat_map(|t| uses(&t.id)).copied().collect();
         let there = |k: u32| report.hardware.gpu(k).map(|g| &g.gpu);
@@ -61,7 +61,7 @@ impl Here {
     }
 }
 
-/// Returns what is certain to be wrong, one sentence each.
+/// Returns the figures that are certainly wrong, one sentence each.
 fn impossible(report: &Report) -> Vec<String> {
     let hardware = &report.hardware;
     let own = hardware.parameters.iter().chain(hardware.gpus.iter().flat_map(|g| &g.parameters));
@@ -80,7 +80,7 @@ fn impossible(report: &Report) -> Vec<String> {
     found
 }
 
-/// Returns what several threads gain over one, if that is more than `tolerance` times their number.
+/// Returns a sentence for each speed-up of several threads that exceeds `tolerance` times their number.
 fn scaling_beyond_threads(hardware: &Hardware, tolerance: f64) -> Vec<String> {
     let all = hardware.value(ParameterId::UsableCores);
     let ratios = [(ParameterId::ScalingTwoThreadsRatio, Some(2.0)), (ParameterId::ScalingAllThreadsRatio, all)];
@@ -179,8 +179,8 @@ pub(crate) fn hardware_doubts(hardware: &Hardware) -> Vec<String> {
     scaling_beyond_threads(hardware, SCALING_TOLERANCE).iter().map(|what| format!("{what}{because}")).collect()
 }
 
-/// Says that a hypervisor moved the cores of the machine during the sweep: what several threads gain changes with their
-/// distance.
+/// Returns a sentence if a hypervisor moved the cores of the machine during the sweep: the speed-up of several threads
+/// changes with their distance.
 fn moved_cores(report: &Report) -> Option<String> {
     let latencies: Vec<[f64; 2]> = report.points.iter().filter_map(|p| p.core_to_core_ns).collect();
     let usual = median(latencies.as_flattened())?;

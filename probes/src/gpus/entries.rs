@@ -50,7 +50,7 @@ fn try_out(algorithm: &mut dyn BroadPhase) -> Result<(), Error> {
     algorithm.find_pairs(&[Aabb::default(); 2], &mut Pairs::new())
 }
 
-/// Returns the algorithms that could be tried, and what kept the process from trying the others.
+/// Returns the algorithms that could be tried, and why the process did not try the others.
 ///
 /// # Errors
 /// When no process can be started.

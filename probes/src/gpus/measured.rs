@@ -24,7 +24,7 @@ pub(crate) struct Measured {
     pub(crate) usable: Vec<GpuIdentity>,
     /// The GPUs that were not taken.
     pub(crate) left_out: Vec<GpuIdentity>,
-    /// Sentences about what went wrong.
+    /// Sentences about failures.
     pub(crate) remarks: Vec<String>,
 }
 

@@ -1,7 +1,8 @@
 //! The GPUs of this machine.
 //!
 //! A driver that crashes costs its GPU and not the run: one process looks for GPUs, another one tries the algorithms
-//! on them, and one each measures them. A verb loads drivers into its own process only after that went well.
+//! on them, and a separate process measures each of them. A verb loads drivers into its own process only after that
+//! went well.
 
 mod choice;
 mod entries;

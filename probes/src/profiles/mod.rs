@@ -72,7 +72,7 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
     Ok(Outcome::Done)
 }
 
-/// The GPUs to make profiles of.
+/// Returns the GPUs to make profiles of.
 ///
 /// # Errors
 /// When no process can be started, or this machine lacks a GPU that `--gpu` names.
@@ -88,7 +88,7 @@ fn taken(arguments: &Probe) -> anyhow::Result<Vec<GpuIdentity>> {
     Ok(taken)
 }
 
-/// Each profile with the longest time that it should take and the command that measures it.
+/// Lists each profile with the longest time that it should take and the command that measures it.
 fn listing(all: &[Profile], lacks: &[Option<String>]) -> String {
     let mut rows = vec![["profile", "at most", "command"].map(str::to_owned).to_vec()];
     let mut left = Duration::ZERO;
@@ -101,7 +101,7 @@ fn listing(all: &[Profile], lacks: &[Option<String>]) -> String {
     format!("{}\n{} profiles, {} at most", columns(&rows), all.len(), HumanDuration(left))
 }
 
-/// Where the reports go, and what they are compared with.
+/// The folder of the reports, with the machine and the algorithms that they must match.
 struct Folder {
     path: PathBuf,
     physical_id: String,
@@ -113,7 +113,7 @@ impl Folder {
         self.path.join(format!("{}.json", profile.name))
     }
 
-    /// Why a profile has to be measured; `None` when the folder holds a good report of it.
+    /// Returns why a profile has to be measured; `None` when the folder holds a good report of it.
     ///
     /// # Errors
     /// When its file is no report, or one of another machine or another command: that is never replaced.
@@ -135,7 +135,7 @@ impl Folder {
         Ok(flaw(&report, &self.registry))
     }
 
-    /// Measures a profile and returns what is wrong with its report, if anything. `before` is the time of those done.
+    /// Measures a profile and returns the flaw of its report, if any. `before` is the time of the finished profiles.
     ///
     /// # Errors
     /// When no process can be started, and on Ctrl-C.

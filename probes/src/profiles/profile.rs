@@ -25,7 +25,7 @@ pub(super) struct Profile {
     /// SIMD level to force; `None` for the highest.
     pub(super) simd: Option<SimdLevel>,
     pub(super) gpus: Vec<GpuIdentity>,
-    /// The most that it should take.
+    /// The longest time that it should take.
     pub(super) time: Duration,
 }
 
@@ -38,9 +38,9 @@ impl Profile {
 /// Threads and SIMD level; `None` for all that the machine has.
 type Limits = (Option<u32>, Option<SimdLevel>);
 
-/// The profiles of a machine: the whole of it, each lower SIMD level, fewer threads, and both on one thread; the same
-/// with each real GPU; all real GPUs together; two software adapters together. The first and the one-thread profile
-/// come a second time at the end, for the noise floor.
+/// Returns the profiles of a machine: the whole of it, each lower SIMD level, fewer threads, and both on one thread;
+/// the same with each real GPU; all real GPUs together; two software adapters together. The first and the one-thread
+/// profile come a second time at the end, for the noise floor.
 ///
 /// Profiles with GPUs are quick, and with `--quick` all are.
 pub(super) fn profiles(probe: &Probe, cores: u32, level: SimdLevel, gpus: &[GpuIdentity]) -> Vec<Profile> {

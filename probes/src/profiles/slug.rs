@@ -2,20 +2,20 @@
 
 use sapwise_tune::GpuIdentity;
 
-/// Characters of a name at most.
+/// Most characters of a name.
 const LONGEST: usize = 48;
 
-/// Words that tell nothing in the name of a CPU.
+/// Words that carry no information in the name of a CPU.
 const FILLERS: [&str; 2] = ["cpu", "processor"];
 
-/// The name of a machine: its CPU and its usable cores, such as `amd-ryzen-9-7950x-16c`.
+/// Returns the name of a machine: its CPU and its usable cores, such as `amd-ryzen-9-7950x-16c`.
 pub(crate) fn machine(cpu: &str, cores: u32) -> String {
     // The nominal clock follows the sign.
     let words = slug(cpu.split('@').next().unwrap_or(""));
     format!("{}-{cores}c", if words.is_empty() { "unknown-cpu" } else { &words })
 }
 
-/// The names of GPUs, in their order; the second of one kind ends in `-2`.
+/// Returns the names of GPUs, in their order; the second GPU with the same name ends in `-2`.
 pub(super) fn gpus(gpus: &[GpuIdentity]) -> Vec<String> {
     let slugs: Vec<String> = gpus.iter().map(|gpu| slug(&gpu.name)).collect();
     let name = |(k, slug): (usize, &String)| {
@@ -28,23 +28,19 @@ pub(super) fn gpus(gpus: &[GpuIdentity]) -> Vec<String> {
     slugs.iter().enumerate().map(name).collect()
 }
 
-/// Returns lower case letters and digits with a hyphen between words. Drops what is in brackets, and a word's
-/// repetitions.
+/// Returns lower case letters and digits with a hyphen between words. Drops text in parentheses, and
+/// repetitions of a word.
 fn slug(text: &str) -> String {
     let mut depth = 0_u32;
-    let mut plain = String::new();
-    for c in text.chars() {
-        match c {
-            '(' => depth += 1,
-            ')' => depth = depth.saturating_sub(1),
-            _ if depth == 0 && c.is_ascii_alphanumeric() => {
-                plain.push(c.to_ascii_lowercase());
-                continue;
-            }
-            _ => {}
-        }
-        plain.push(' ');
-    }
+    let plain = text.chars().map(|c| {
+        depth = match c {
+            '(' => depth + 1,
+            ')' => depth.saturating_sub(1),
+            _ => depth,
+        };
+        if depth == 0 && c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { ' ' }
+    });
+    let plain: String = plain.collect();
     let all: Vec<&str> = plain.split_ascii_whitespace().collect();
     let is_number = |word: &str| word.bytes().all(|b| b.is_ascii_digit());
     let mut words: Vec<&str> = Vec::new();

@@ -1,8 +1,8 @@
-//! What a program does between two frames, in place of it.
+//! A stand-in for the work of a program between two frames.
 //!
 //! No program runs the same frame twice. Without this, a contestant that does the same work as the one before it
 //! finds a trained branch predictor: in `uniform` with up to 3000 boxes the adaptive choice then took 1.15 to 1.19 ×
-//! the time of two fixed algorithms that were alike (medians of the frames, three seeds each, Zen 5).
+//! the time of two fixed algorithms of equal speed (medians of the frames, three seeds each, Zen 5).
 
 use sapwise_scenes::Random;
 use std::hint::black_box;

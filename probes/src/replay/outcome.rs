@@ -13,12 +13,12 @@ use std::ops::Range;
 pub(crate) struct Outcome {
     pub(crate) fixed: Vec<AlgorithmId>,
     pub(crate) frames: Vec<Frame>,
-    /// What the adaptive choice ran at every frame of the last complete repeat.
+    /// The adaptive choice at every frame of the last complete repeat.
     pub(crate) choices: Vec<Choice>,
     /// Complete repeats.
     pub(crate) repeats: usize,
     pub(crate) interrupted: bool,
-    /// Median share of the CPU that other programs took; `None` when the replay was too short to tell.
+    /// Median share of the CPU that other programs took; `None` when the replay was too short to measure it.
     pub(crate) foreign_load: Option<f64>,
     /// Algorithms that could not run, or not to the end, and why.
     pub(crate) notes: Vec<String>,
@@ -36,7 +36,7 @@ pub(crate) struct Frame {
     pub(crate) fixed_ns: Vec<f64>,
 }
 
-/// What the adaptive choice did at a frame.
+/// The adaptive choice at a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Choice {
     /// A position among the fixed algorithms.
@@ -94,7 +94,7 @@ pub(crate) struct Part {
     pub(crate) explored: usize,
 }
 
-/// What a frame of the adaptive choice is beside one that continues with the same algorithm.
+/// Kinds of frames of the adaptive choice.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Continues,
@@ -114,7 +114,7 @@ impl Kind {
     }
 }
 
-/// Returns the frames out of the samples of each. `choices` holds what the adaptive choice did in each repeat.
+/// Combines the samples of each frame. `choices` holds the adaptive choices of each repeat.
 pub(super) fn frames(
     objects: &[usize],
     adaptive: &[Samples],
@@ -219,8 +219,8 @@ pub(crate) mod tests {
         Choice { chosen: Some(chosen), reason, load, predicted_ns: Some(1e6), measured_ns: None, runner_up }
     }
 
-    /// An outcome of one repeat: objects, milliseconds of the adaptive choice and of the fixed algorithms, and what
-    /// ran.
+    /// Makes an outcome of one repeat: objects, milliseconds of the adaptive choice and of the fixed algorithms, and
+    /// the choice.
     pub(crate) fn outcome(fixed: &[&str], list: &[(usize, f64, &[f64], Choice)]) -> Outcome {
         let choices: Vec<Choice> = list.iter().map(|f| f.3.clone()).collect();
         let adaptive: Vec<Samples> = list.iter().map(|f| samples(&[f.1 * 1e6])).collect();
@@ -244,7 +244,7 @@ pub(crate) mod tests {
         let adaptive = samples(&[10.0, 10.0, 10.0, 40.0]);
         assert_eq!(mean_over_kinds(&adaptive, &[Continues, Continues, Continues, Explores]), 17.5);
         assert_eq!(mean_over_kinds(&adaptive, &[Continues, Continues, Continues, Switches]), 17.5);
-        // Noise of one repeat among alike ones does not.
+        // Noise in one of several repeats of the same kind does not count.
         let adaptive = samples(&[10.0, 10.0, 10.0, 10.0, 40.0, 10.0]);
         assert_eq!(mean_over_kinds(&adaptive, &[Continues; 6]), 10.0);
     }

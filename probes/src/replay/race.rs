@@ -17,12 +17,13 @@ use std::time::Instant;
 /// its total is printed, and it can't be the best. A single sample may have found cold caches.
 const HOPELESS: f64 = 10.0;
 
-/// An algorithm is not timed at frames with as many objects as one that took it longer than this ...
+/// After a frame that took an algorithm longer than this, it is not timed at frames with at least that number of
+/// objects ...
 const TOO_LONG_NS: f64 = 1e9;
-/// ... and this many times as long as the best.
+/// ... if the frame also took this many times as long as the best.
 const TOO_SLOW: f64 = 100.0;
 
-/// What to replay.
+/// The settings of a replay.
 #[derive(Debug)]
 pub(crate) struct ReplaySettings {
     pub(crate) source: FrameSource,
@@ -30,15 +31,15 @@ pub(crate) struct ReplaySettings {
     pub(crate) repeats: usize,
     /// Seed of the order of turns.
     pub(crate) seed: u64,
-    /// Whether the adaptive choice corrects the tuning by what frames took.
+    /// Whether the adaptive choice corrects the tuning by the times of frames.
     pub(crate) learning: bool,
 }
 
 /// Replays the frames: in each repeat the same frames again, and at each frame every contestant in random order,
 /// because a parallel algorithm leaves threads and caches behind that the next one feels.
 ///
-/// Every repeat starts with fresh algorithms and the tuning as it was given, so that the repeats are alike frame by
-/// frame. The first one compares the pairs of all contestants, outside the timed part.
+/// Every repeat starts with fresh algorithms and the given tuning, so that the repeats are alike frame by frame. The
+/// first one compares the pairs of all contestants, outside the timed part.
 ///
 /// # Errors
 /// When no algorithm of the tuning can run, when contestants disagree about the pairs, or on Ctrl-C in the first
@@ -73,8 +74,8 @@ pub(crate) fn replay(settings: &ReplaySettings, tuning: &Tuning, registry: &Regi
     Ok(race.outcome(settings, &loads))
 }
 
-/// Algorithms of a tuning with more threads than the registry lists: the adaptive choice leaves them out. When the
-/// tuning is steps it runs them all the same.
+/// Returns the algorithms of a tuning with more threads than the registry lists: the adaptive choice leaves them out.
+/// If the tuning has steps only, it runs them anyway, and the list is empty.
 pub(crate) fn too_wide<'a>(tuning: &'a Tuning, registry: &Registry) -> Vec<&'a AlgorithmId> {
     let most = registry.entries().iter().map(|e| e.id.threads()).max().unwrap_or(1);
     tuning.algorithms().into_iter().filter(|id| !tuning.costs.is_empty() && id.threads() > most).collect()
@@ -97,8 +98,8 @@ impl Contestant {
         Ok(Self { id, algorithm, samples: vec![Samples::default(); frames], too_many: usize::MAX })
     }
 
-    /// Whether another sample at this frame would change nothing. `best` is the fastest sample of all contestants
-    /// there.
+    /// Returns whether another sample at this frame would change nothing. `best` is the fastest sample of all
+    /// contestants there.
     fn is_skipped(&self, frame: usize, objects: usize, best: f64) -> bool {
         let samples = &self.samples[frame];
         let hopeless = samples.len() >= 2 && samples.fastest() > HOPELESS * best;
@@ -251,7 +252,7 @@ impl Race {
         }
     }
 
-    /// The name of whoever has a turn.
+    /// Returns the name of the contestant of a turn.
     fn name(&self, turn: usize) -> String {
         self.contestants.get(turn).map_or("the adaptive choice".to_owned(), |c| c.id.to_string())
     }

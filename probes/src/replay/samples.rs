@@ -84,7 +84,8 @@ pub(super) mod tests {
 
     #[test]
     fn one_half_chooses_and_the_other_gives_the_time() {
-        // Medians of the even repeats 10 and 12, of the odd ones 14 and 11: each half prefers what was lucky in it.
+        // Medians of the even repeats 10 and 12, of the odd ones 14 and 11: each half prefers the algorithm that was
+        // lucky in it.
         let frame = vec![samples(&[10.0, 14.0, 10.0, 14.0]), samples(&[12.0, 11.0, 12.0, 11.0])];
         assert_eq!(windows(&[frame]), [13.0]);
         let once = vec![samples(&[10.0]), samples(&[12.0]), samples(&[])];

@@ -18,8 +18,7 @@ use std::time::{Duration, Instant};
 const MOST_FRAMES: usize = 40;
 /// Fewest frames when the time of the point is over.
 pub(super) const FEWEST_FRAMES: usize = 3;
-/// Windows thrown away for each one that is kept, at most: on a machine that is always busy more would only take
-/// time.
+/// Most windows that are thrown away for each kept one: on a machine that is always busy more would only take time.
 const MOST_REDONE: u32 = 2;
 /// Share of a point's time in which spoiled frames are redone. Later ones are kept with the foreign load beside them.
 const REDO_SHARE: f64 = 2.0 / 3.0;
@@ -81,8 +80,8 @@ impl Race {
         }
     }
 
-    /// Runs `racers` on frame after frame of `scene` until it is clear which is the fastest or `time` is over. Those
-    /// who are surely beaten rest from then on, so that their samples are the first ones of the point.
+    /// Runs `racers` on frame after frame of `scene` until the fastest is clear or `time` is over. Racers that are
+    /// surely beaten rest for the remaining frames, so that their samples are the first ones of the point.
     pub(crate) fn run(&mut self, racers: &mut [Racer], scene: &mut Scene, time: Duration) -> Raced {
         let began = Instant::now();
         let mut mismatches = Vec::new();
@@ -200,7 +199,7 @@ impl Race {
     }
 
     fn verify(&mut self, racers: &mut [Racer], boxes: &[Aabb], mismatches: &mut Vec<String>) {
-        // For large frames the first of the list counts as right: it is the simplest that is left.
+        // For large frames the answer of the first racer counts as right: it is the simplest one left.
         let first = racers.iter().find_map(|r| r.answer);
         let Some(right) = Answer::naive(boxes, &mut self.naive).or(first) else { return };
         for racer in racers.iter_mut() {
@@ -231,8 +230,8 @@ impl Race {
     }
 }
 
-/// Returns the mean load of frames with the same number of objects. A single frame may be unlike the others: `teleport`
-/// jumps in every 30th.
+/// Returns the mean load of frames with the same number of objects. A single frame may be unlike the others:
+/// `teleport` jumps in every 30th.
 fn mean(loads: &[Load]) -> Load {
     let mean = |value: fn(&Load) -> f64| loads.iter().map(value).sum::<f64>() / loads.len() as f64;
     Load::of_objects(loads[0].objects)

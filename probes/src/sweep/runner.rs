@@ -63,7 +63,7 @@ pub(crate) fn sweep_all(plan: &Plan, conditions: &Conditions, keep: &mut dyn FnM
             visits = order.into_iter().map(|k| visits[k].clone()).collect();
             let before = sweep.found.points.len();
             let goes_on = sweep.go(&scenario, Schedule::Visits(visits), time, u64::from(round))?;
-            // Readers tell rounds apart by their ascending sizes.
+            // Readers separate rounds by their ascending sizes.
             sweep.found.points[before..].sort_by_key(|p| p.load.objects);
             if !goes_on {
                 return Ok(sweep.found);
@@ -86,7 +86,7 @@ struct Sweep<'a> {
 }
 
 impl Sweep<'_> {
-    /// Sweeps one scenario in a process of its own. Whether the sweep goes on.
+    /// Sweeps one scenario in a process of its own. Returns whether the sweep goes on.
     fn go(&mut self, scenario: &str, schedule: Schedule, time: Duration, round: u64) -> anyhow::Result<bool> {
         self.progress.message(scenario);
         match self.run(scenario, schedule, time, round)? {
@@ -131,7 +131,7 @@ impl Sweep<'_> {
         run_part(&["sweep", &text], time + GRACE, &mut |line| {
             let event = match serde_json::from_str(line) {
                 Ok(event) => event,
-                // Drivers print what they like on the standard output of whoever loads them.
+                // Drivers may print anything on the standard output of the process that loads them.
                 Err(_) if !gpus.is_empty() => return Ok(()),
                 Err(error) => return Err(error).with_context(|| format!("{scenario}: its process printed {line:?}")),
             };

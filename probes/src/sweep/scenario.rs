@@ -120,8 +120,8 @@ impl ScenarioSweep<'_> {
     /// Runs one size and reports wrong answers.
     fn point(&mut self, racers: &mut [Racer], objects: u32, time: Duration) -> anyhow::Result<Raced> {
         let mut scene = self.scenario.start(objects as usize, self.seed);
-        // It must not remember another scene: after a failed try with ten boxes `pair-cache` kept no pairs at all larger
-        // sizes, and took 2.5 times as long.
+        // It must not remember another scene: after a failed try with ten boxes, `pair-cache` kept no pairs at all
+        // larger sizes, and took 2.5 × the time.
         for racer in racers.iter_mut().filter(|r| r.error.is_none() && r.algorithm.is_incremental()) {
             racer.algorithm = self.registry.create(&racer.id)?;
         }
@@ -175,8 +175,8 @@ impl Before {
     fn leave_out_slow(&mut self, standings: &mut [Standing]) -> bool {
         let ratios: f64 = standings.iter_mut().filter_map(Standing::leave_if_slow).sum();
         let of_best = |times: f64| Duration::try_from_secs_f64(times * self.best_ns / 1e9).unwrap_or_default();
-        // The medians that are taken off may add up to more than the shortest frame; those who stay take at least
-        // this.
+        // The subtracted medians may add up to more than the shortest frame. The remaining algorithms take at least
+        // the second duration.
         let staying = standings.iter().filter(|s| !s.out).count();
         self.frame = self.frame.saturating_sub(of_best(ratios)).max(of_best(staying as f64));
         ratios > 0.0

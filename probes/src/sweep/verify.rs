@@ -5,7 +5,7 @@ use sapwise::{Aabb, Pairs};
 /// Up to this many boxes a double loop that shares no code with any algorithm gives the right answer.
 pub(crate) const NAIVE_OBJECTS: usize = 2000;
 
-/// What answers are compared by.
+/// Number and fingerprint of pairs, by which answers are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Answer {
     pub(crate) pairs: u64,

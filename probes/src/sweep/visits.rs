@@ -1,4 +1,4 @@
-//! The sizes that a round of a sweep visits again: those where the best two algorithms lie close.
+//! The sizes that a round of a sweep visits again: those at which the best two algorithms take similar times.
 
 use super::request::Visit;
 use sapwise::AlgorithmId;
@@ -20,7 +20,7 @@ const FRAMES: f64 = 12.0;
 /// Time to move and verify one object in one frame.
 const NS_PER_OBJECT: f64 = 60.0;
 
-/// What is known of a size: visits so far, and each algorithm's mean over them of its median in nanoseconds.
+/// The results at a size: number of visits, and the mean of each algorithm's medians over them, in nanoseconds.
 #[derive(Default)]
 struct Size {
     visits: u32,
@@ -42,7 +42,8 @@ impl Size {
         self.ns.iter().min_by(|a, b| a.1.total_cmp(b.1)).map(|(id, _)| id)
     }
 
-    /// A visit of those who are close to the best; `None` when the best is alone. At least `shortest` seconds long.
+    /// Returns a visit of the algorithms that are close to the best; `None` when the best is alone. It takes at least
+    /// `shortest` seconds.
     fn visit(&self, objects: u32, shortest: f64) -> Option<Visit> {
         let limit = CLOSE * self.ns.get(self.best()?)?;
         let close: BTreeMap<&AlgorithmId, f64> =
@@ -55,8 +56,8 @@ impl Size {
     }
 }
 
-/// The visits of one round within `time`, by scenario, ascending by size. Sizes with the fewest visits so far come
-/// first, then those that take the least time.
+/// Returns the visits of one round within `time`, by scenario, ascending by size. Sizes with the fewest earlier visits
+/// are chosen first, then those that take the least time.
 pub(super) fn visits(points: &[Point], time: Duration) -> BTreeMap<String, Vec<Visit>> {
     let mut scenarios: BTreeMap<&str, BTreeMap<u32, Size>> = BTreeMap::new();
     for point in points {
@@ -83,7 +84,7 @@ pub(super) fn visits(points: &[Point], time: Duration) -> BTreeMap<String, Vec<V
     chosen
 }
 
-/// A visit between two sizes where different algorithms are the best.
+/// Returns a visit between two sizes at which different algorithms are the best.
 fn between(below: (&u32, &Size), above: (&u32, &Size), shortest: f64) -> Option<Visit> {
     let ((&low, below), (&high, above)) = (below, above);
     if below.best() == above.best() || f64::from(high) < NARROW * f64::from(low) {

@@ -9,13 +9,13 @@ use crate::terminal::Terminal;
 use crate::{output, shell};
 use sapwise_lab::data::report_files;
 use sapwise_lab::kinds::{Agreement, Kind, Times};
-use sapwise_lab::text::count;
+use sapwise_lab::text::{count, once};
 use serde::Serialize;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Times over those of repeats above which a report is not like them. Undisturbed repeats differ by 2 %, a program that
-/// takes memory or cache makes it 0 to 36 %.
+/// Times over those of repeats above which a report is not like them. Undisturbed repeats differ by 2 %, a program
+/// that takes memory or cache makes it 0 to 36 %.
 const SLOW: f64 = 1.15;
 
 /// The reports of one kind, in the order of the files.
@@ -57,39 +57,31 @@ pub(crate) fn run(arguments: &Check, algorithms: &Algorithms) -> anyhow::Result<
 /// Sorts reports into kinds and compares each with the others of its kind. One that is slower than they are becomes
 /// doubtful.
 fn compare(files: &mut [Finding]) -> Vec<OfKind> {
-    let mut kinds: Vec<(Kind, Vec<usize>)> = Vec::new();
-    for (k, kind) in files.iter().enumerate().filter_map(|(k, f)| Some((k, f.kind.as_ref()?))) {
-        match kinds.iter_mut().find(|known| known.0 == *kind) {
-            Some(known) => known.1.push(k),
-            None => kinds.push((kind.clone(), vec![k])),
-        }
-    }
-    let mut compared = Vec::new();
-    for (kind, members) in kinds {
-        let agreement = |own: usize| {
-            let others = members.iter().filter(|&&k| k != own).filter_map(|&k| files[k].times.as_ref());
-            files[own].times.as_ref()?.over(&others.collect::<Vec<&Times>>())
+    let of_kind = |kind: Kind| {
+        let members: Vec<&Finding> = files.iter().filter(|f| f.kind.as_ref() == Some(&kind)).collect();
+        let repeat = |own: &&Finding| {
+            let others = members.iter().filter(|f| f.file != own.file).filter_map(|f| f.times.as_ref());
+            let over_others = own.times.as_ref().and_then(|times| times.over(&others.collect::<Vec<&Times>>()));
+            Repeat { file: own.file.clone(), over_others }
         };
-        let found: Vec<(usize, Option<Agreement>)> = members.iter().map(|&k| (k, agreement(k))).collect();
-        let mut reports = Vec::new();
-        for (k, over_others) in found {
-            let slow = over_others.map(|a| a.median).filter(|&ratio| ratio > SLOW);
-            files[k].doubts.extend(slow.map(|ratio| {
-                format!(
-                    "it takes {ratio:.2} × the time of the other reports of its kind: look for throttling, other \
-                     programs or another setup"
-                )
-            }));
-            reports.push(Repeat { file: files[k].file.clone(), over_others });
+        OfKind { reports: members.iter().map(repeat).collect(), kind }
+    };
+    let kinds: Vec<OfKind> = once(files.iter().filter_map(|f| f.kind.clone())).into_iter().map(of_kind).collect();
+    for Repeat { file, over_others } in kinds.iter().flat_map(|kind| &kind.reports) {
+        let slow = over_others.map(|a| a.median).filter(|&ratio| ratio > SLOW);
+        if let (Some(ratio), Some(finding)) = (slow, files.iter_mut().find(|f| f.file == *file)) {
+            finding.doubts.push(format!(
+                "it takes {ratio:.2} × the time of the other reports of its kind: look for throttling, other programs \
+                 or another setup"
+            ));
         }
-        compared.push(OfKind { kind, reports });
     }
-    compared
+    kinds
 }
 
 fn text(files: &[Finding], kinds: &[OfKind], terminal: Terminal) -> String {
     let reports = kinds.iter().map(|kind| kind.reports.len()).sum::<usize>();
-    // Of many reports the table says what is good.
+    // With several reports, the table lists the good ones.
     let is_told = |f: &&Finding| reports < 2 || f.kind.is_none() || !f.problems.is_empty() || !f.doubts.is_empty();
     let mut text: String = files.iter().filter(is_told).map(|f| of_file(f, terminal)).collect();
     if reports > 1 {
@@ -118,7 +110,7 @@ fn verdict(finding: &Finding, terminal: Terminal) -> String {
     }
 }
 
-/// Which reports can be believed, which are of one kind, and how far repeats agree.
+/// Draws a table: which reports can be believed, which are of one kind, and how far repeats agree.
 fn table(files: &[Finding], kinds: &[OfKind], terminal: Terminal) -> String {
     let mut rows = vec![["report", "kind", "believed", "× repeats"].map(str::to_owned).to_vec()];
     let folder = common_folder(kinds.iter().flat_map(|kind| &kind.reports).map(|repeat| &*repeat.file));
@@ -160,7 +152,8 @@ fn words(kind: &Kind) -> String {
     format!("{cpu}, {}, {simd}, host {host}{gpus}{gpu_threads}", count(*cores as usize, "core"))
 }
 
-/// The next command to try: for the first file with a problem or a doubt, else for the first file or for all reports.
+/// Returns the next command to try: for the first file with a problem or a doubt, otherwise for the first file or for
+/// all reports.
 fn next_step(files: &[Finding], given: &[PathBuf]) -> String {
     let bad = files.iter().find(|f| !f.problems.is_empty() || !f.doubts.is_empty());
     let Some(file) = bad.or(files.first()) else { return shell::next("predict") };

@@ -1,4 +1,4 @@
-//! `sapwise devices`: what this machine can run.
+//! `sapwise devices`: the algorithms that this machine can run.
 
 use crate::algorithms::Algorithms;
 use crate::args::Devices;

@@ -20,7 +20,7 @@ use sapwise::algorithm::SimdLevel;
 /// Runs a verb to its end.
 ///
 /// # Errors
-/// Whatever keeps the verb from finishing.
+/// When the verb can't finish.
 pub(crate) fn run(verb: Verb, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
     // The library ignores a wrong variable, which would label a measurement with a wrong level.
     SimdLevel::requested().map_err(|e| WrongUsage(e.to_string()))?;

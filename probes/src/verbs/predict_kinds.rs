@@ -35,7 +35,7 @@ pub(super) fn run(folder: &Path, arguments: &Predict, algorithms: &Algorithms) -
     let progress = Progress::new(0);
     let mut reports = read_reports(&[folder.to_owned()], &progress)?;
     drop(progress);
-    // No program runs on a machine that somebody else published.
+    // Published machines are in nobody's fleet.
     reports.retain(|(_, report)| report.label != Label::Published);
     if reports.is_empty() {
         bail!("{} holds published parameters only; name a folder with measured reports", folder.display());
@@ -74,10 +74,10 @@ pub(super) fn run(folder: &Path, arguments: &Predict, algorithms: &Algorithms) -
     Ok(if without == 0 { Outcome::Done } else { Outcome::Failed })
 }
 
-/// For each file name the kind of machine, and its report whose times are nearest to those of the others; or why its
-/// reports can't stand for it.
+/// Returns for each file name the kind of machine, and its report whose times are nearest to those of the others, or
+/// why none of its reports can represent it.
 ///
-/// Hosts that only their clock tells apart have one file: that of the kind with the most reports.
+/// Hosts that differ only in their clock share one file: the kind with the most reports gets it.
 fn choose(reports: &[(String, Report)], arguments: &Predict) -> BTreeMap<String, (Kind, Result<usize, &'static str>)> {
     let mut kinds: BTreeMap<Kind, Vec<usize>> = BTreeMap::new();
     for (k, (_, report)) in reports.iter().enumerate() {
@@ -100,7 +100,7 @@ fn choose(reports: &[(String, Report)], arguments: &Predict) -> BTreeMap<String,
     chosen
 }
 
-/// The one of some reports whose times are nearest to those of the others.
+/// Returns the report whose times are nearest to those of the others.
 fn nearest(reports: &[(String, Report)], members: &[usize]) -> Option<usize> {
     let times: Vec<Times> = members.iter().map(|&k| Times::of(&reports[k].1)).collect();
     let off = |own: usize| {

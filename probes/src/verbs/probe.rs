@@ -81,7 +81,7 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
         let told = told.map(|told| format!("\n{told}\n")).unwrap_or_default();
         summary::report(&report, Terminal::of_standard_output()) + &told + &next.unwrap_or_default()
     };
-    // A standard output that is closed or full is told last: what went wrong with the report matters more.
+    // A closed or full standard output is reported last: an error of the report matters more.
     let printed = output::print(&text);
     let saved = saved?;
     if interrupted {
@@ -95,7 +95,7 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
     Ok(Outcome::Done)
 }
 
-/// The report of this node that is there already, where it need not be measured again.
+/// Returns the existing report of this node if it need not be measured again.
 ///
 /// # Errors
 /// When it is a good one of another command, or no report: neither is replaced.
@@ -120,7 +120,7 @@ fn good(path: &Path, arguments: &Probe, algorithms: &Algorithms) -> anyhow::Resu
     Ok(Some(there))
 }
 
-/// What to sweep; `None` with `--hardware-only`.
+/// Returns the plan of the sweep; `None` with `--hardware-only`.
 fn plan(arguments: &Probe) -> anyhow::Result<Option<Plan>> {
     hardware::check_threads(arguments.threads)?;
     let scenarios = arguments.scenarios();

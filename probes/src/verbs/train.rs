@@ -53,7 +53,7 @@ fn name(arguments: &Train) -> anyhow::Result<String> {
 /// Columns of the table of strategies that fit into 80 characters: the strategy, the regrets, the share over 10 %.
 const SHOWN: [usize; 4] = [0, 1, 2, 8];
 
-/// What the columns of the summary mean.
+/// Explanation of the columns of the summary.
 const COLUMNS: &str = "Regret is time over the best time, less one; in parentheses weighted for games,\n\
 assumed to have around 800 objects. --card writes and explains all columns.\n";
 

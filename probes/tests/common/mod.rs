@@ -1,4 +1,4 @@
-//! What the tests of the command share.
+//! Helpers of the tests of the command.
 
 #![allow(dead_code, reason = "each test program uses a part of this")]
 
@@ -6,19 +6,20 @@ use assert_cmd::Command;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// The command, with no SIMD level from the environment of the tests.
+/// Returns the command, with no SIMD level from the environment of the tests.
 pub(crate) fn sapwise() -> Command {
     Command::from_std(program())
 }
 
-/// The same, to be spawned.
+/// Returns the same command, to be spawned.
 pub(crate) fn program() -> std::process::Command {
     let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
     command.env_remove("SAPWISE_SIMD").env_remove("CARGO");
     command
 }
 
-/// A sound and current report of this build, with twelve points. `machine` is a hex digit that tells machines apart.
+/// Makes a sound and current report of this build, with twelve points. `machine` is a hex digit that identifies the
+/// machine.
 pub(crate) fn small_report(machine: &str) -> Value {
     let text = include_str!("../../../crates/lab/tests/fixtures/report-3.json");
     let mut report: Value = serde_json::from_str(text).unwrap();

@@ -12,7 +12,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// Larger files are refused before they fill the memory. A full report of a machine with 64 threads has 2 MB.
+/// Larger files are refused before they fill the memory. A full report of a machine with 64 threads takes 2 MB.
 const LARGEST_BYTES: u64 = 64 << 20;
 
 /// A file of Sapwise, whatever its schema.

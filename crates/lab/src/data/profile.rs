@@ -1,4 +1,4 @@
-//! A report as training sees it: the hardware, and the median of each algorithm at each point.
+//! A report reduced for training: the hardware, and the median of each algorithm at each point.
 
 use super::compared::is_real;
 use crate::paired::median_error;
@@ -16,7 +16,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 pub struct Profile {
     /// Name of the report, as [`read_report`](super::read_report) gives it.
     pub file: String,
-    /// What kind of evidence it is.
+    /// The kind of evidence.
     pub label: Label,
     /// The host that it was measured on.
     pub host: String,
@@ -26,7 +26,7 @@ pub struct Profile {
     pub hardware: Hardware,
     /// The algorithms that were timed.
     pub algorithms: Vec<Timed>,
-    /// Where they were timed, in the order of the report.
+    /// The points at which they were timed, in the order of the report.
     pub points: Vec<Spot>,
 }
 
@@ -74,7 +74,7 @@ impl Profile {
         }
     }
 
-    /// Returns the host. What all of its reports share is no evidence about another one.
+    /// Returns the host. Reports of one host are no independent evidence.
     pub fn machine(&self) -> &str {
         &self.host
     }

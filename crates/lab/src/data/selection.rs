@@ -7,7 +7,7 @@ use sapwise::AlgorithmId;
 use sapwise::algorithm::BackendClass;
 use std::collections::{BTreeMap, HashMap};
 
-/// What shares a revision: a method on one class of processor.
+/// A method on one class of processor, which has one revision.
 pub(crate) type MethodKey = (BackendClass, String);
 
 /// The reports that can be trained on, added one by one so that none has to stay in memory.
@@ -28,7 +28,7 @@ impl Selection {
         selection
     }
 
-    /// Reduces a report to what is trained on.
+    /// Reduces a report to the timings that are trained on.
     ///
     /// # Errors
     /// Why the report is left out.
@@ -37,7 +37,7 @@ impl Selection {
             return Err(format!("{file} is left out: it {why}"));
         }
         let mut profile = Profile::of(file, report);
-        // Between two frames on the CPU a software adapter takes its caches and cores: no program has such frames.
+        // A software adapter takes caches and cores between two frames on the CPU, which happens in no program.
         if report.label == Label::RealSoftwareGpu {
             profile.retain(|t| t.id.backend().class() == BackendClass::Gpu);
         }
@@ -59,7 +59,7 @@ impl Selection {
         }
     }
 
-    /// Returns the profiles with the newest revision of each method only, and what was left out and why.
+    /// Returns the profiles with the newest revision of each method only, and a sentence for each omission.
     pub fn finish(mut self) -> (Vec<Profile>, Vec<String>) {
         self.keep_apart();
         let mut newest: BTreeMap<MethodKey, u32> = BTreeMap::new();
@@ -109,8 +109,8 @@ fn refusal(report: &Report) -> Option<String> {
     } else if report.points.is_empty() {
         "holds no timings; measure again without `--hardware-only`"
     } else if report.label == Label::RealContended {
-        // Of two threads one waits for its turn on a core: 4 ms, where alone both take 50 µs. No hardware parameter
-        // shows that.
+        // One of two threads waits 4 ms for its turn on a core; on an idle machine both take 50 µs. No hardware
+        // parameter shows that.
         "was measured while other programs ran on the same cores; measure again when the machine is idle"
     } else {
         return None;

@@ -10,7 +10,7 @@ use sapwise_tune::model::GPU_PREFIX;
 use sapwise_tune::{Hardware, stats};
 use std::collections::BTreeMap;
 
-/// Always chooses the role with the least mean regret over the training profiles that have it, each of which comes with
+/// Always chooses the role with the least mean regret over the training profiles that have it. Each profile comes with
 /// the regret of always choosing each of its algorithms. Every machine counts the same; its profiles share its weight.
 pub(super) fn single_best<'a>(training: &[(&Profile, &[f64])], available: &[AlgorithmId]) -> Strategy<'a> {
     let regret = |role: &Role| -> Option<f64> {
@@ -24,7 +24,7 @@ pub(super) fn single_best<'a>(training: &[(&Profile, &[f64])], available: &[Algo
         let means: Vec<f64> = machines.values().map(|regrets| stats::mean(regrets)).collect();
         (!means.is_empty()).then(|| stats::mean(&means))
     };
-    // Where there is one thread, it is all threads too.
+    // With one thread, the single thread counts as all threads too.
     let known = roles(available).into_iter().flat_map(|(role, _)| [Role { all: true, ..role.clone() }, role]);
     let mut candidates = Vec::from_iter(known);
     candidates.sort();
@@ -35,9 +35,9 @@ pub(super) fn single_best<'a>(training: &[(&Profile, &[f64])], available: &[Algo
 
 /// Chooses brute force on one thread up to and including `last` objects, and `above` on all threads from there on.
 ///
-/// With 64 and `grid-sap` this is nexus: brute force up to 64 colliders, then a tree, for which strips stand as the
-/// fastest in large scenes here. With 999 and `sap` it is `mujoco_warp`, whose constant of 1000 bodies separates two
-/// kinds of sweep. Both run on a GPU there, and on the CPU here, which every machine has.
+/// With 64 and `grid-sap` this is nexus: brute force up to 64 colliders, then a tree. Here `grid-sap` takes the place
+/// of the tree, as the fastest method in large scenes. With 999 and `sap` it is `mujoco_warp`, whose constant of 1000
+/// bodies separates two kinds of sweep. Both run on a GPU there, and on the CPU here, which every machine has.
 pub(super) fn frozen<'a>(last: u32, above: &str, available: &[AlgorithmId]) -> Strategy<'a> {
     let on_cpu = |method: &'_ str| {
         let of = |id: &&AlgorithmId| id.method() == method && id.backend().class() == BackendClass::Cpu;
@@ -53,7 +53,7 @@ pub fn by_costs(costs: Vec<AlgorithmCost>, available: &[AlgorithmId]) -> Strateg
     by_tuning(tuning(costs), available)
 }
 
-/// Does the same among the algorithms that a program runs unless it asks for others.
+/// As [`by_costs`], among the algorithms that a program runs by default.
 pub(super) fn by_costs_of_running(costs: Vec<AlgorithmCost>, available: &[AlgorithmId]) -> Strategy<'_> {
     by_tuning(tuning(costs).for_running(), available)
 }
@@ -69,8 +69,8 @@ fn by_tuning(tuning: Tuning, available: &[AlgorithmId]) -> Strategy<'_> {
     })
 }
 
-/// Returns the costs of another machine under the names of this one's algorithms: all threads stand for all threads,
-/// and fewer for the same number. What has no counterpart is left out.
+/// Returns the costs of another machine under the names of this one's algorithms: all threads there become all threads
+/// here, and fewer threads keep their number. Costs without a counterpart here are left out.
 pub(super) fn of_another(costs: &[AlgorithmCost], available: &[AlgorithmId]) -> Vec<AlgorithmCost> {
     let theirs: Vec<AlgorithmId> = costs.iter().map(|c| c.algorithm.clone()).collect();
     let whole = roles(&theirs).into_iter().filter(|(role, _)| role.all);
@@ -102,7 +102,7 @@ pub(super) fn closest(id: &AlgorithmId, available: &[AlgorithmId]) -> Option<Alg
     same.or_else(|| available.iter().filter(alike).min_by(|a, b| distance(a).total_cmp(&distance(b)))).cloned()
 }
 
-/// What machines are compared by: the logarithms of their parameters.
+/// The logarithms of the parameters that machines are compared by.
 #[derive(Debug, Clone)]
 pub(super) struct Likeness(Vec<Option<f64>>);
 

@@ -1,4 +1,4 @@
-//! The strategies that a prediction competes with, and what each is fitted to.
+//! The strategies that a prediction competes with, and the data that each is fitted to.
 
 use super::baselines::{self, Likeness, by_costs, by_costs_of_running};
 use super::direct::{RoleOutcome, direct, role_outcomes};
@@ -22,34 +22,34 @@ const FOREST: &str = "random forest";
 const NEAREST: &str = "nearest machine";
 const FULL_SWEEP: &str = "full sweep";
 
-/// What all folds share.
+/// Data that all folds share.
 pub(super) struct Material<'a> {
     pub(super) profiles: &'a [Profile],
     table: Table,
-    /// The regret table of each profile, when it is first needed.
+    /// The regret table of each profile, computed when it is first needed.
     regrets: Vec<OnceLock<RegretTable>>,
     /// Which of two algorithms is cheaper at which sizes, on each profile.
     outcomes: Vec<Vec<RoleOutcome>>,
-    /// What machines are compared by, of each profile.
+    /// The parameters of each profile that machines are compared by.
     likeness: Vec<Likeness>,
     /// Whether each profile has timings on a real GPU.
     on_gpu: Vec<bool>,
-    /// Each of these without its GPUs, when it is first needed.
+    /// Each profile without its GPUs, computed when it is first needed.
     on_cpu: Vec<OnceLock<(Profile, RegretTable)>>,
 }
 
-/// What folds share in which the same scenario is held out, or none.
+/// Data shared by the folds that hold out the same scenario, or no scenario.
 pub(super) struct Seen<'a> {
     without: Option<&'a str>,
     designs: &'a Designs<'a>,
-    /// The measured costs of each profile, when they are first needed.
+    /// The measured costs of each profile, computed when they are first needed.
     costs: Vec<OnceLock<Vec<AlgorithmCost>>>,
 }
 
-/// What was fitted to the training of a fold.
+/// Everything that was fitted to the training profiles of a fold.
 pub(super) struct Fitted<'a> {
     seen: &'a Seen<'a>,
-    /// Positions of the profiles of the training, and what their machines are compared by.
+    /// Positions of the training profiles, and the parameters that their machines are compared by.
     known: Vec<usize>,
     likeness: Vec<&'a Likeness>,
     /// These profiles with the mean regret of always choosing each algorithm.
@@ -62,7 +62,7 @@ pub(super) struct Fitted<'a> {
     pub(super) notes: Vec<String>,
 }
 
-/// What a model predicts for a profile, and its physical terms alone.
+/// The costs that a model predicts for a profile, and those by its physical terms alone.
 pub(super) struct Ours {
     pub(super) whole: Vec<AlgorithmCost>,
     physics: Vec<AlgorithmCost>,
@@ -125,8 +125,8 @@ impl<'a> Material<'a> {
         })
     }
 
-    /// Returns a profile as a fold judges it, and what each choice costs on it: without its GPUs if no machine of the
-    /// training has a real one. A real GPU that software adapters predict shows nothing.
+    /// Returns a profile as a fold judges it, and its regret table: without its GPUs if no machine of the training has
+    /// a real one. Predicting a real GPU from software adapters shows nothing.
     pub(super) fn judged(&self, k: usize, fitted: &Fitted<'_>) -> (&Profile, &RegretTable) {
         if fitted.knows_gpus || !self.on_gpu[k] {
             return (&self.profiles[k], self.regret_table(k));
@@ -140,7 +140,7 @@ impl<'a> Material<'a> {
         (profile, table)
     }
 
-    /// Returns what each choice costs on a profile.
+    /// Returns the regret table of a profile.
     pub(super) fn regret_table(&self, k: usize) -> &RegretTable {
         self.regrets[k].get_or_init(|| RegretTable::new(&self.profiles[k]))
     }
@@ -221,7 +221,7 @@ fn by<'a>(name: &'static str, costs: Costs<'a>, available: &'a [AlgorithmId]) ->
     Contestant { name, choose: by_costs(costs.to_vec(), available), costs: Some(costs) }
 }
 
-/// A strategy that is not judged by costs.
+/// A strategy without costs, whose crossovers are not judged.
 fn alone<'a>(name: &'static str, choose: Strategy<'a>) -> Contestant<'a> {
     Contestant { name, choose, costs: None }
 }

@@ -80,8 +80,8 @@ mod tests {
         assert_eq!(coverage(&[errors("a", 1.0)]), None);
         let alike = coverage(&[errors("a", 1.0), errors("b", 1.0)]).unwrap();
         assert!((alike.times_90_ln - 0.9).abs() < 1e-9 && (alike.ratios - 0.9).abs() < 0.02, "{alike:?}");
-        // The second is off by twice as much: it has all of the first within its limit, which has 45 of a hundred of
-        // it.
+        // The second is off by twice as much. Its limit holds all errors of the first; the limit of the first holds 45
+        // of its 100.
         let apart = coverage(&[errors("a", 1.0), errors("b", 2.0)]).unwrap();
         assert!(
             (apart.times_90_ln - 1.35).abs() < 1e-9 && (apart.times - (1.0 + 0.455) / 2.0).abs() < 0.01,

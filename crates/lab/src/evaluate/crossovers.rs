@@ -39,7 +39,8 @@ impl MeasuredCrossovers {
         Some(Self { scenario: scenario.to_owned(), loads, crossovers })
     }
 
-    /// Returns the [nearest](Self::nearest) predicted crossing of each crossover whose algorithms have predicted costs.
+    /// Returns the [nearest](Self::nearest) predicted crossing of each crossover whose algorithms have predicted
+    /// costs.
     pub(super) fn predicted(&self, costs: &[AlgorithmCost]) -> Vec<ComparedCrossover> {
         self.crossovers.iter().filter_map(|b| self.nearest(b, costs)).collect()
     }
@@ -51,13 +52,13 @@ impl MeasuredCrossovers {
         let ids: Vec<AlgorithmId> = costs.iter().map(|c| c.algorithm.clone()).collect();
         let cost = |id: &AlgorithmId| {
             let found = closest(id, &ids)?;
-            // Under its own name, since one cost may stand in for both sides.
+            // Under its own name, since one cost may serve for both sides.
             costs.iter().find(|c| c.algorithm == found).map(|cost| renamed(cost, id))
         };
         Some(self.compared(crossover, cost(&crossover.below)?, cost(&crossover.above)?))
     }
 
-    /// Returns the octaves between the two positions of each of them.
+    /// Returns the octaves between measured and predicted position, for each crossover with predicted costs.
     pub(super) fn errors(&self, costs: &[AlgorithmCost]) -> Vec<f64> {
         self.predicted(costs).iter().map(ComparedCrossover::octaves).collect()
     }
@@ -81,8 +82,8 @@ impl MeasuredCrossovers {
     }
 }
 
-/// Returns the logarithm of the cost of one algorithm over that of another at a number of objects, interpolated between
-/// the loads of a slice; beyond its end that at the end.
+/// Returns the logarithm of the cost of one algorithm over that of another at a number of objects, interpolated
+/// between the loads of a slice. Beyond the slice it is the value at the nearer end.
 fn ln_ratio(loads: &[Load], objects: f64, of: &AlgorithmCost, over: &AlgorithmCost) -> f64 {
     let at = |load: &Load| (of.curve.cost_ns(load) / over.curve.cost_ns(load)).ln();
     let above = loads.partition_point(|l| f64::from(l.objects) <= objects);
@@ -143,7 +144,7 @@ mod tests {
         let crossover = crossovers.crossovers[0].clone();
         let (first, last) =
             (f64::from(crossovers.loads[0].objects), f64::from(crossovers.loads.last().unwrap().objects));
-        // Who is cheaper below is said to be cheaper everywhere, and the other way round.
+        // The algorithm below is predicted to be cheaper everywhere, and then nowhere.
         let ever = crossovers.errors(&slower(&costs, &crossover.above, 1e6))[0];
         assert!((ever - (last / crossover.objects).log2()).abs() < 0.03, "{ever}");
         let never = crossovers.errors(&slower(&costs, &crossover.below, 1e6))[0];
@@ -151,7 +152,7 @@ mod tests {
         // A little too slow below moves the crossover down, not away.
         let near = crossovers.errors(&slower(&costs, &crossover.below, 1.3))[0];
         assert!(near > 0.05 && near < never, "{near}");
-        // What is not predicted is not judged.
+        // An algorithm without a predicted cost is not judged.
         let others: Vec<AlgorithmCost> =
             costs.iter().filter(|c| c.algorithm.method() != crossover.below.method()).cloned().collect();
         assert!(crossovers.errors(&others).len() < crossovers.crossovers.len());

@@ -25,7 +25,7 @@ const PARAMETERS: [&str; 4] = [
     ParameterId::ForkJoinColdNs.as_str(),
 ];
 
-/// The same of a crossover between the CPU and a GPU, or between two methods on GPUs.
+/// The same for a crossover between the CPU and a GPU, or between two methods on GPUs.
 const GPU_PARAMETERS: [&str; 4] = [
     ParameterId::ScalingAllThreadsRatio.as_str(),
     "gpu/round_trip_ns",
@@ -74,20 +74,13 @@ pub(super) fn role_outcomes(profile: &Profile) -> Vec<RoleOutcome> {
     outcomes
 }
 
-/// The prediction for a pair of roles.
+/// The predicted crossover of a pair of roles.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Prediction {
-    Always { first: bool },
-    At { ln_objects: f64, first_below: bool },
-}
-
-impl Prediction {
-    fn first_wins(self, ln_objects: f64) -> bool {
-        match self {
-            Self::Always { first } => first,
-            Self::At { ln_objects: at, first_below } => (ln_objects < at) == first_below,
-        }
-    }
+struct Prediction {
+    /// Infinite if one of the two always wins.
+    ln_objects: f64,
+    /// Whether the first one wins with fewer objects.
+    first_below: bool,
 }
 
 /// Applies the direct regression to a machine: the winner of most pairwise comparisons is chosen. `training` are
@@ -111,8 +104,8 @@ pub(super) fn direct<'a>(
     Ok(Box::new(move |load| {
         let ln_objects = f64::from(load.objects.max(1)).ln();
         let mut wins = vec![0; roles.len()];
-        for &(a, b, prediction) in &predictions {
-            wins[if prediction.first_wins(ln_objects) { a } else { b }] += 1;
+        for &(a, b, Prediction { ln_objects: at, first_below }) in &predictions {
+            wins[if (ln_objects < at) == first_below { a } else { b }] += 1;
         }
         let most = wins.iter().max()?;
         wins.iter().position(|w| w == most).map(|k| roles[k].1.clone())
@@ -141,13 +134,13 @@ fn predict(
     if 2 * crossed.len() <= found.len() {
         let always = |c: &RoleOutcome, first: bool| c.crossings.is_empty() && c.first_is_cheaper == first;
         let [firsts, seconds] = [true, false].map(|first| found.iter().filter(|(_, c)| always(c, first)).count());
-        return Ok(Some(Prediction::Always { first: firsts >= seconds }));
+        return Ok(Some(Prediction { ln_objects: f64::INFINITY, first_below: firsts >= seconds }));
     }
     let first_below = 2 * crossed.iter().filter(|(_, p)| p.first_below).count() >= crossed.len();
     let rows: Vec<_> = crossed.into_iter().filter(|(_, p)| p.first_below == first_below).collect();
     let machines: Vec<&Hardware> = rows.iter().map(|r| r.0).collect();
     let ln_objects: Vec<f64> = rows.iter().map(|r| r.1.objects.ln()).collect();
-    Ok(Some(Prediction::At { ln_objects: estimate(&parameters(a, b), &machines, &ln_objects, hardware)?, first_below }))
+    Ok(Some(Prediction { ln_objects: estimate(&parameters(a, b), &machines, &ln_objects, hardware)?, first_below }))
 }
 
 /// Regresses values on the logarithms of parameters and evaluates the line for a machine. Skips parameters that are
@@ -166,8 +159,8 @@ fn estimate(names: &[&str], machines: &[&Hardware], values: &[f64], hardware: &H
     regressed(&table, values, &row(hardware))
 }
 
-/// Fits ordinary least squares to a table of shape (rows, columns), and evaluates the line at a row; the mean when there
-/// are not more rows than coefficients.
+/// Fits ordinary least squares to a table of shape (rows, columns), and evaluates the line at a row; the mean when
+/// there are not more rows than coefficients.
 ///
 /// # Errors
 /// When linfa refuses the fit.

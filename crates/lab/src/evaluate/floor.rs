@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use sapwise::tuning::AlgorithmCost;
 use std::collections::BTreeMap;
 
-/// Points that a run needs: fewer are no whole sweep.
+/// Fewest points of a run that counts: a run with fewer is not a whole sweep.
 const FEWEST_POINTS: usize = 100;
 
 /// Returns the floor over all profiles that repeat each other; `None` if none does.

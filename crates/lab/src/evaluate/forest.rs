@@ -14,10 +14,10 @@ use std::collections::BTreeMap;
 
 /// Trees of a forest.
 const TREES: usize = 25;
-/// Rows that a forest is grown from, at most.
+/// Most rows that a forest is grown from.
 const MOST_ROWS: usize = 3000;
-/// Profiles that forests are grown from, about, and rows of each for a method, at least: from a handful of rows no
-/// tree learns how time grows with the load.
+/// Approximate number of profiles that forests are grown from, and fewest rows of each for a method: from a handful of
+/// rows no tree learns how time grows with the load.
 const MOST_PROFILES: usize = 400;
 const FEWEST_OF_PROFILE: usize = 15;
 /// Rows in a leaf.
@@ -38,7 +38,7 @@ struct Example {
 
 impl Table {
     /// Collects the rows. The lower bound of an algorithm that had left the sweep counts as a time: a tree does not
-    /// extrapolate, and would predict the last time before it for a million objects.
+    /// extrapolate. Without the bound it would predict the last measured time even for a million objects.
     pub(super) fn new(profiles: &[Profile]) -> Self {
         let step = profiles.len().div_ceil(MOST_PROFILES).max(1);
         let most = (MOST_ROWS / profiles.len().div_ceil(step).max(1)).max(FEWEST_OF_PROFILE);
@@ -119,8 +119,8 @@ impl Forest {
     }
 }
 
-/// Returns what a tree may split by: the load, the number of threads or GPUs, and the logarithms of the parameters
-/// that machines are compared by, on GPUs those of the first one. A missing parameter is zero.
+/// Returns the features that a tree may split by: the load, the number of threads or GPUs, and the logarithms of the
+/// parameters that machines are compared by, on GPUs those of the first one. A missing parameter is zero.
 fn features(hardware: &Hardware, backend: &Backend, load: &Load) -> Vec<f64> {
     let of_load = [
         f64::from(load.objects).ln_1p(),

@@ -1,4 +1,4 @@
-//! Regrets and crossovers of what was held out, for figures and tables.
+//! Regrets on held-out profiles and their crossovers, for figures and tables.
 
 use super::crossovers::ComparedCrossover;
 use crate::training::Regrets;
@@ -12,7 +12,7 @@ pub struct HeldOut {
     pub crossovers: Vec<HeldOutCrossover>,
 }
 
-/// The mean regrets of a strategy on what was held out.
+/// The mean regrets of a strategy on a held-out machine.
 #[derive(Debug, Clone)]
 pub struct UnitRegrets {
     /// The strategy.
@@ -32,6 +32,6 @@ pub struct HeldOutCrossover {
     pub file: String,
     /// The scenario of the frames.
     pub scenario: String,
-    /// Where it was measured, and where it was predicted.
+    /// The measured position and the predicted one.
     pub compared: ComparedCrossover,
 }

@@ -19,13 +19,13 @@ use std::collections::{BTreeMap, BTreeSet};
 const LEAST_OCTAVES: f64 = 0.1;
 /// Reports in which a crossover between methods on the CPU must have been measured.
 const FEWEST_REPORTS: usize = 3;
-/// Hosts below which data decide nothing about a parameter.
+/// Fewest hosts for which the data decide about a parameter.
 const FEWEST_HOSTS: usize = 3;
 /// Ratio of the highest to the lowest value below which a parameter is about the same on all hosts.
 const LEAST_RATIO: f64 = 2.0;
-/// Correlation of logarithms from which on two parameters can't be told apart.
+/// Correlation of logarithms at or above which the effects of two parameters can't be separated.
 const TOGETHER: f64 = 0.9;
-/// After the name of a method on GPUs.
+/// Follows the name of a method on GPUs.
 const ON_GPU: &str = " on a GPU";
 
 /// How far a crossover moves when one hardware parameter doubles.
@@ -61,7 +61,7 @@ struct Found<'a> {
     profile: &'a Profile,
     scenario: String,
     log2_objects: f64,
-    /// Octaves for a doubling of each parameter by the model, where it predicts the crossover.
+    /// Octaves for a doubling of each parameter by the model, if it predicts the crossover.
     by_model: BTreeMap<String, f64>,
 }
 
@@ -116,7 +116,7 @@ fn of_profile<'a>(profile: &'a Profile, model: &Model) -> Vec<(String, Found<'a>
     all
 }
 
-/// Predicts the timed algorithms on other hardware, those on several threads with some times as many.
+/// Predicts the timed algorithms on other hardware. Algorithms on several threads get `threads` times their number.
 fn costs(profile: &Profile, model: &Model, hardware: Hardware, threads: u32) -> Option<Vec<AlgorithmCost>> {
     let run = |id: &AlgorithmId| match id.backend() {
         Backend::Cpu(k) if *k > 1 => AlgorithmId::new(id.method(), Backend::Cpu(k * threads)).ok(),

@@ -16,7 +16,7 @@ pub const NOT_TIMED: f64 = 10.0;
 
 /// Cells a decade of the number of objects.
 const PER_DECADE: f64 = 4.0;
-/// Rounds of taking means over algorithms and over points in turn. The values stand still after a few.
+/// Rounds of taking means over algorithms and over points in turn. The values hardly change after a few rounds.
 const ROUNDS: usize = 8;
 /// Mean and standard deviation of the base-10 logarithm of the number of objects in games, an assumption: the 64
 /// colliders at which nexus leaves brute force and the 10 000 bodies of a large scene lie two standard deviations to
@@ -25,9 +25,9 @@ const USUAL_OBJECTS: (f64, f64) = (2.9, 0.55);
 
 /// The cost of each algorithm of a report in each cell, a quarter of a decade of a scenario, over the best.
 ///
-/// A sweep visits most often the sizes at which two algorithms lie close, where every choice costs little: counted
-/// one by one these points would flatter any strategy. And the least of several medians is too low by their errors,
-/// which averaging over a cell reduces.
+/// A sweep visits most often the sizes at which two algorithms take about the same time. Every choice costs little
+/// there, so counting these points one by one would flatter any strategy. And the least of several medians is too low
+/// by their errors, which averaging over a cell reduces.
 #[derive(Debug, Clone)]
 pub struct RegretTable {
     cells: Vec<Cell>,
@@ -140,8 +140,8 @@ impl RegretTable {
         (0..self.algorithms).map(|k| summed(cells(), |cell| cell.over_best[k] - 1.0)).collect()
     }
 
-    /// Returns the regret of choosing in each cell what is best in the same cell of another table; cells that the
-    /// other one lacks don't count.
+    /// Returns the regret of choosing in each cell the algorithm that is best in the same cell of another table. Cells
+    /// that the other table lacks don't count.
     pub fn by_cells_of(&self, profile: &Profile, other: &Self, of_other: &Profile) -> Regret {
         let alike = |cell: &Cell| other.cells.iter().find(|c| c.scenario == cell.scenario && c.decade == cell.decade);
         let chosen = |cell: &Cell| -> Option<f64> {

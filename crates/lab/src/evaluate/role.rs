@@ -1,9 +1,10 @@
-//! What an algorithm is on any machine, whatever its number of threads.
+//! The role of an algorithm, which does not depend on the number of threads of a machine.
 
 use sapwise::AlgorithmId;
 use sapwise::algorithm::BackendClass;
 
-/// A method on one or all threads of its machine, or on one or all GPUs: every machine has these, whatever its counts.
+/// A method on one or all threads of its machine, or on one or all GPUs: every machine has these, whatever its numbers
+/// of threads and GPUs.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Role {
     pub(super) class: BackendClass,

@@ -8,7 +8,7 @@ use crate::training::{MethodScore, Regrets, Split};
 use sapwise_tune::stats::{self, median};
 use std::collections::BTreeMap;
 
-/// The strategy whose gap to the best choice others close.
+/// The strategy that the other ones must beat.
 pub const SINGLE_BEST: &str = "single best";
 /// The strategy of `predict`.
 pub const OURS: &str = "physics + load";
@@ -37,7 +37,7 @@ pub(super) struct Judged {
 }
 
 impl Judged {
-    /// Returns what one regret is of: the machine, or the profile if there is one machine only.
+    /// Returns the unit of one regret: the machine, or the file of the profile if there is one machine only.
     pub(super) fn unit(&self, by_machine: bool) -> &str {
         if by_machine { &self.machine } else { &self.file }
     }

@@ -16,9 +16,9 @@ use anyhow::Result;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Profiles that are judged, of all folds together, about.
+/// Approximate number of judged profiles over all folds.
 const MOST_JUDGED: usize = 120;
-/// Fits without a fold and a scenario, at most: of many machines each is held out in some scenarios only.
+/// Most fits without a fold and a scenario. With many machines, each is held out in some of the scenarios only.
 const MOST_UNSEEN: usize = 80;
 
 /// The result of a validation.
@@ -27,14 +27,14 @@ const MOST_UNSEEN: usize = 80;
 pub struct Validated {
     /// The score of every strategy.
     pub validation: Validation,
-    /// Sentences on what the scores do not say.
+    /// Sentences about the limits of the scores.
     pub notes: Vec<String>,
-    /// Regrets and crossovers of what was held out.
+    /// Regrets on the held-out profiles, and their crossovers.
     pub held_out: HeldOut,
 }
 
-/// Holds out one fold of a [`Partition`] after the other, fits to the others, and lets every strategy choose on what
-/// was held out.
+/// Holds out each fold of a [`Partition`] in turn, fits to the others, and lets every strategy choose on the held-out
+/// profiles.
 ///
 /// Scores no strategy when there is one profile only. Each fold is a step of `progress`.
 ///

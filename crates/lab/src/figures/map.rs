@@ -13,7 +13,7 @@ pub(crate) struct FieldMap {
     pub(crate) panels: Vec<MapPanel>,
 }
 
-/// Cells, and what was timed as points.
+/// Cells, and the timed frames as points.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct MapPanel {
     pub(crate) title: String,

@@ -25,7 +25,7 @@ const NAMES: u32 = 230;
 /// Size of letters, as plotters counts it: 1.24 em.
 const LETTERS: u32 = 15;
 
-/// Okabe and Ito's colours, which colour-blind readers tell apart, then four more; black is for what was chosen.
+/// Okabe and Ito's colours, which colour-blind readers can distinguish, then four more. Black is for the choice.
 const COLOURS: [RGBColor; 11] = [
     RGBColor(230, 159, 0),
     RGBColor(86, 180, 233),
@@ -40,12 +40,12 @@ const COLOURS: [RGBColor; 11] = [
     RGBColor(150, 150, 150),
 ];
 
-/// The colour of the series at a position.
+/// Returns the colour of the series at a position.
 fn colour(k: usize) -> RGBColor {
     COLOURS[k % COLOURS.len()]
 }
 
-/// Text without characters that an SVG can't hold or that turn the direction of what follows.
+/// Replaces characters that an SVG can't hold or that turn the direction of the text after them.
 pub(crate) fn plain(text: &str) -> String {
     let turns = |c: char| matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     text.chars().map(|c| if c.is_control() || turns(c) { char::REPLACEMENT_CHARACTER } else { c }).collect()
@@ -60,7 +60,7 @@ fn text(area: &Area<'_>, text: &str, at: (i32, i32), h: HPos) -> Result<()> {
     Ok(area.draw(&Text::new(plain(text), at, style(h, VPos::Center)))?)
 }
 
-/// An SVG of this width and height, with a title above and the names of the colours at the right.
+/// Draws an SVG of this width and height, with a title above and the names of the colours at the right.
 ///
 /// # Errors
 /// When `content` fails or plotters does.
@@ -101,14 +101,14 @@ where
     Ok(mesh.x_labels(7).y_labels(8).x_label_formatter(&tick).y_label_formatter(&tick).draw()?)
 }
 
-/// The smallest range that holds all values above zero, wider by a factor at both ends.
+/// Returns the smallest range that holds all values above zero, widened by a factor at both ends.
 fn range(values: impl Iterator<Item = f64>, wider: f64) -> std::ops::Range<f64> {
     let known = values.filter(|v| v.is_finite() && *v > 0.0);
     let (low, high) = known.fold((f64::INFINITY, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)));
     if low <= high { low / wider..high * wider } else { 0.1..10.0 }
 }
 
-/// A logarithmic axis with numbers at powers of ten, or of less over a short range, where those of ten are few.
+/// Returns a logarithmic axis with numbers at powers of ten, or at powers of 2 or √2 over a short range.
 fn log(range: std::ops::Range<f64>) -> LogCoord<f64> {
     let base = match range.end / range.start {
         ratio if ratio < 5.0 => std::f64::consts::SQRT_2,
@@ -118,7 +118,7 @@ fn log(range: std::ops::Range<f64>) -> LogCoord<f64> {
     range.log_scale().base(base).into()
 }
 
-/// A number on an axis: `100 000`, `0.01`.
+/// Formats a number on an axis: `100 000`, `0.01`.
 fn tick(value: &f64) -> String {
     let rounded = |fine: f64| format!("{}", (value * fine).round() / fine);
     match *value {
@@ -128,7 +128,7 @@ fn tick(value: &f64) -> String {
     }
 }
 
-/// A chart with its title above and room for the numbers on both axes.
+/// Prepares a chart with its title above and room for the numbers on both axes.
 fn chart<'a, 'b>(area: &'a Area<'b>, title: &str) -> Result<ChartBuilder<'a, 'b, SVGBackend<'b>>> {
     text(area, title, (76, 10), HPos::Left)?;
     let mut chart = ChartBuilder::on(area);
@@ -137,12 +137,12 @@ fn chart<'a, 'b>(area: &'a Area<'b>, title: &str) -> Result<ChartBuilder<'a, 'b,
     Ok(chart)
 }
 
-/// Areas for so many panels, in rows of up to three.
+/// Returns areas for this number of panels, in rows of up to three.
 fn panels<'a>(area: &Area<'a>, count: usize) -> Vec<Area<'a>> {
     area.split_evenly(grid(count))
 }
 
-/// Rows and columns of so many panels.
+/// Returns the rows and columns of this number of panels.
 fn grid(count: usize) -> (usize, usize) {
     let columns = if count == 4 { 2 } else { count.clamp(1, 3) };
     (count.div_ceil(columns).max(1), columns)

@@ -13,7 +13,7 @@ const AXIS: u32 = 44;
 pub(crate) struct Ratios {
     pub(crate) title: String,
     pub(crate) machines: Vec<String>,
-    /// A name, and the ratio of each machine where it is known.
+    /// A name, and the ratio of each machine if it is known.
     pub(crate) rows: Vec<(String, Vec<Option<f64>>)>,
 }
 

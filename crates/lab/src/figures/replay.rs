@@ -3,29 +3,29 @@
 use super::{HPos, LINE, Result, colour, log, mesh, range, svg, text};
 use plotters::prelude::*;
 
-/// Points of a curve at most; more can't be seen.
+/// Most points of a curve; more can't be seen.
 const MOST_POINTS: usize = 1000;
-/// Letters of a line of the caption.
+/// Most letters of a line of the caption.
 const MOST_LETTERS: usize = 150;
 
 /// The times of the adaptive choice and of every fixed algorithm, a value a frame.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Replay {
-    /// What stands above the picture.
+    /// The title above the picture.
     pub title: String,
     /// The time of the choice in ns.
     pub chosen_ns: Vec<f64>,
     /// The position of the algorithm that was chosen, among the fixed ones.
     pub chosen: Vec<Option<usize>>,
-    /// Names of the fixed algorithms with their times in ns; infinite where one was not timed.
+    /// Names of the fixed algorithms with their times in ns; infinite for a frame that was not timed.
     pub fixed: Vec<(String, Vec<f64>)>,
     /// Paragraphs below the picture.
     pub caption: Vec<String>,
 }
 
 impl Replay {
-    /// Draws the choice in black over the curves of the algorithms, and below them a strip in the colour of what was
-    /// chosen.
+    /// Draws the choice in black over the curves of the algorithms, and below them a strip in the colour of the chosen
+    /// algorithm.
     ///
     /// # Errors
     /// When plotters fails.
@@ -66,7 +66,7 @@ impl Replay {
     }
 }
 
-/// Means in µs over equal numbers of frames, each at its first frame. Infinite times are left out.
+/// Returns means in µs over equal numbers of frames, each at its first frame. Infinite times are left out.
 fn thinned(ns: &[f64]) -> Vec<(f64, f64)> {
     let step = ns.len().div_ceil(MOST_POINTS).max(1);
     let mean = |(k, chunk): (usize, &[f64])| {
@@ -76,7 +76,7 @@ fn thinned(ns: &[f64]) -> Vec<(f64, f64)> {
     ns.chunks(step).enumerate().filter_map(mean).collect()
 }
 
-/// Lines of whole words.
+/// Splits a text into lines of whole words.
 fn wrapped(text: &str) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in text.split_whitespace() {

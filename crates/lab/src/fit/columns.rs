@@ -2,7 +2,7 @@
 
 use ndarray::{Array1, Array2, ArrayView1, Axis};
 
-/// Share of its variation that a column must not share with the columns before it.
+/// Least share of the variation of a column that the columns before it don't explain.
 const OWN_SHARE: f64 = 0.02;
 
 /// Leverage above which a row decides a coefficient alone: without that row its error would be over a hundred times
@@ -75,7 +75,8 @@ impl Columns {
         }
     }
 
-    /// Returns the leverage of each row in a fit with a mean: the diagonal of the hat matrix. For columns of full rank.
+    /// Returns the leverage of each row in a fit with a mean: the diagonal of the hat matrix. For columns of full
+    /// rank.
     fn leverages(&self) -> Vec<f64> {
         let base = self.base();
         let row = |k: usize| self.shares[k] + base.iter().map(|(_, q)| q[k] * q[k]).sum::<f64>();
@@ -160,7 +161,7 @@ mod tests {
 
     #[test]
     fn a_column_that_serves_one_row_beside_the_others_is_dropped() {
-        // The second column is the first one but for the last row.
+        // The second column differs from the first one in the last row only.
         let values = Array2::from_shape_fn((8, 3), |(i, j)| {
             let n = i as f64;
             [n, n + if i == 7 { 2.0 } else { 0.0 }, (n - 3.0).powi(2)][j]

@@ -28,9 +28,9 @@ const CONSTANT_LN: f64 = 0.05;
 const CURVE_LN: f64 = 0.12;
 /// Number of functions of the load of one algorithm. More follow the measured scenes more closely and others less.
 const CURVE: usize = 6;
-/// Number of timings that the assumed noise counts for in a spread.
+/// Weight of the assumed noise in a spread, as a number of timings.
 const PRIOR: f64 = 8.0;
-/// A timing farther from the fit than this many standard deviations of its noise counts as that far, in this many fits.
+/// An error beyond this many standard deviations of its noise is clipped to that, in each of this many fits.
 const REACH: f64 = 3.0;
 const ROUNDS: usize = 4;
 
@@ -206,7 +206,7 @@ mod tests {
         Row { profile: 0, algorithm: algorithm as u16, spot: spot as u32, load, ns, behind: 1.0, floor: false }
     }
 
-    /// By how much costs were corrected at a load, in natural logarithms.
+    /// Returns the correction of each cost at a load, in natural logarithms.
     fn corrections(profile: &Profile, rows: &[Row], load: &Load) -> Vec<f64> {
         let corrected = corrected(costs(profile), profile, rows);
         assert!(corrected.iter().all(|c| c.curve.defect().is_none()));

@@ -28,12 +28,13 @@ use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// Points on one thread, or on GPUs, that a method needs on all machines together.
+/// Fewest points on one thread, or on GPUs, that a method needs over all machines.
 pub(super) const FEWEST_POINTS: usize = 3;
-/// Rows that the terms are fitted to, about, and rows of each profile at least. A dozen coefficients need no more.
+/// Approximate number of rows that the terms are fitted to, and fewest rows of each profile. A dozen coefficients need
+/// no more.
 const MOST_FITTED: usize = 6000;
 const FEWEST_OF_PROFILE: usize = 2;
-/// Timings on several threads that the parameters of helpers are fitted to, at most.
+/// Most timings on several threads that the parameters of helpers are fitted to.
 const MOST_CALLED: usize = 1000;
 
 /// A model of the rows that were fitted, if they are enough.
@@ -49,11 +50,11 @@ pub(super) struct Design {
     pub(super) rows: Vec<Row>,
     /// Nanoseconds for one unit of each component, shape (rows, components).
     values: Array2<f64>,
-    /// The rows on several threads, with what their machines make of these and the time on one thread.
+    /// The rows on several threads, with the thread figures of their machines and the time on one thread.
     called: Vec<(Row, ThreadFigures, Option<f64>)>,
-    /// The groups of those on one thread for residuals.
+    /// The groups of the rows on one thread, for residuals.
     groups: Groups,
-    /// The method was never timed on one thread, so that its time on several counts as its work.
+    /// Whether the method was never timed on one thread, so that its time on several counts as its work.
     never_alone: bool,
 }
 
@@ -210,7 +211,8 @@ impl Design {
         Ok(Some(model))
     }
 
-    /// Fits to the rows on several threads what helpers make of the work of one, as measured where it was timed too.
+    /// Fits the effect of helpers to the rows on several threads. The work of one thread is measured if it was timed
+    /// at the same point, else modelled.
     ///
     /// # Errors
     /// When the model can't predict a profile that it was fitted to.

@@ -12,7 +12,7 @@ use sapwise::internals::Places;
 use sapwise_tune::model::MethodModel;
 use std::sync::Arc;
 
-/// The rows of every method with all that a fit needs, worked out once for all fits to parts of the profiles.
+/// The rows of every method with the data of a fit, computed once for all fits to parts of the profiles.
 #[derive(Debug)]
 pub struct Designs<'a> {
     pub(crate) profiles: &'a [Profile],
@@ -22,7 +22,7 @@ pub struct Designs<'a> {
     pub(super) machines: Vec<usize>,
     pub(super) methods: Vec<Design>,
     pub(super) basis: Basis,
-    /// What was left out because a parameter is missing.
+    /// Sentences about profiles that were left out because a parameter is missing.
     pub notes: Vec<String>,
 }
 
@@ -55,7 +55,7 @@ impl<'a> Designs<'a> {
     }
 
     /// Fits a cost model for each method and class of processor that the chosen profiles hold enough timings of.
-    /// Returns them with sentences on what was left out and why.
+    /// Returns them with sentences about the timings and methods that were left out.
     ///
     /// # Errors
     /// When a residual can't be solved for.

@@ -18,7 +18,7 @@ pub(crate) struct Called {
 const CALL_CYCLES: [f64; 11] = [0.0, 100.0, 200.0, 400.0, 700.0, 1000.0, 1500.0, 2000.0, 3000.0, 5000.0, 8000.0];
 const LATE_SHARES: [f64; 13] = [0.0, 0.03, 0.06, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0];
 const SERIAL_SHARES: [f64; 13] = [0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0];
-/// Boxes from which on another thread is called: always, or those of the methods of this library.
+/// Boxes for each further thread: 0 if all threads are always called, or the number of the methods of this library.
 const BOXES_PER_THREAD: [u32; 2] = [0, 1024];
 /// Places in these lists to start from, and steps in them, coarse ones first.
 const STARTS: [[usize; 4]; 2] = [[0, 4, 4, 3], [0, 4, 4, 8]];

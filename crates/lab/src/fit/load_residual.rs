@@ -16,29 +16,29 @@ use sapwise_tune::stats::robust_deviation;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Standard deviation of what the groups of one machine have in common beside what all groups have, in natural
-/// logarithms. No parameter shows it, so that a new machine gets nothing of it.
+/// Standard deviation of the residual that only the groups of one machine share, in natural logarithms. No parameter
+/// shows it, so it is not predicted for a new machine.
 const MACHINE_LN: f64 = 0.1;
 /// Standard deviation of a timing around its residual, in natural logarithms. A third more changes no regret
 /// noticeably.
 pub(super) const NOISE_LN: f64 = 0.12;
-/// Time over the best of the point from which on a timing counts no less for lying further behind.
+/// Time over the best of the point beyond which the weight of a timing falls no further.
 const MOST_BEHIND: f64 = 4.0;
-/// Variance that each place has of its own, as a share. It keeps the weights of neighbouring places from growing
-/// against each other. Likewise for groups.
+/// Share of the variance that is added to each place alone. It keeps the weights of neighbouring places from growing
+/// with opposite signs. Likewise for groups.
 const JITTER: f64 = 1e-4;
 const GROUP_JITTER: f64 = 1e-6;
 /// Steps of a weight within one: finer ones would only lengthen the file of a model.
 const PER_WEIGHT: f64 = 1e6;
-/// Groups of one machine within a length of positions.
+/// Groups within a unit of position: timings of one machine are grouped by their rounded positions.
 const PER_LENGTH: f64 = 4.0;
-/// Loads among which places are chosen, at most.
+/// Most loads among which places are chosen.
 const MOST_LOADS: usize = 1500;
-/// A remainder beyond this many robust standard deviations, and beyond this logarithm, is cut to that: a disturbed
-/// measurement, or what no smooth residual can follow.
+/// A remainder beyond this many robust standard deviations, and beyond this logarithm, is clipped: it is a disturbed
+/// measurement, or too abrupt for a smooth residual.
 const REACH: f64 = 3.0;
 const LEAST_REACH_LN: f64 = 0.6;
-/// Steps of the solver, at most, and the length of the error over that of the right side at which it ends.
+/// Most steps of the solver, and the relative error at which it ends.
 const MOST_STEPS: usize = 500;
 const SOLVED: f64 = 1e-4;
 
@@ -48,15 +48,15 @@ pub(crate) fn noise_ln(behind: f64) -> f64 {
     NOISE_LN * behind.min(MOST_BEHIND)
 }
 
-/// Chooses the places that tell most about the loads of the profiles, each next one where the previous ones tell
-/// least: a pivoted Cholesky decomposition of the covariance (Fine and Scheinberg, Efficient SVM training using
-/// low-rank kernel representations, 2001).
+/// Chooses the places that explain most of the loads of the profiles. Each next place is the load that the previous
+/// ones explain least: a pivoted Cholesky decomposition of the covariance (Fine and Scheinberg, Efficient SVM training
+/// using low-rank kernel representations, 2001).
 ///
 /// They are chosen once for all fits, from the loads of held-out machines too. At the sizes of an ascent every machine
 /// has alike loads. Visits have sizes of their own: a held-out machine contributes loads near its crossovers, but none
 /// of its times.
 pub(crate) fn places(profiles: &[Profile], without: Option<&str>) -> Places {
-    // At the same size of a scenario loads are alike: the first stands for all.
+    // Loads at the same size of a scenario are alike: the first one represents all.
     let mut loads: BTreeMap<(&str, u32), Load> = BTreeMap::new();
     for spot in profiles.iter().flat_map(|p| &p.points).filter(|s| Some(s.scenario.as_str()) != without) {
         loads.entry((&spot.scenario, spot.load.objects)).or_insert(spot.load);
@@ -88,16 +88,16 @@ pub(crate) fn places(profiles: &[Profile], without: Option<&str>) -> Places {
     Places::new(chosen)
 }
 
-/// Loads at which residuals are fitted, with what all fits at them share.
+/// Loads at which residuals are fitted, with the matrices that all fits share.
 #[derive(Debug)]
 pub(crate) struct Basis {
     pub(crate) places: Arc<Places>,
-    /// Lower roots of the covariance of the places, whatever moves and by motion.
+    /// Lower Cholesky factors of the covariance of the places, without motion and with it.
     roots: [Array2<f64>; 2],
 }
 
-/// What the residual at each point of each profile is a sum of, in coordinates in which its prior is a unit matrix;
-/// whatever moves and by motion.
+/// The features of the residual at each point of each profile, in coordinates in which its prior is a unit matrix:
+/// without motion and with it.
 pub(crate) type Features = Vec<[Array2<f64>; 2]>;
 
 impl Basis {
@@ -193,7 +193,7 @@ impl Groups {
         Self { by_motion, groups, cells }
     }
 
-    /// Returns the most likely residual of each position at which there are timings, and what it leaves of each.
+    /// Returns the most likely residual of each position with timings, and the remainder of each timing.
     /// `chosen` are the algorithms of profiles that count, by the position of the first timing, and `ln` the natural
     /// logarithms of measured over modelled time of all their timings.
     ///
@@ -222,7 +222,7 @@ impl Groups {
             *right += &(&own * &cell.precision).dot(&cell.features);
         }
         let groups: Vec<&(Vec<f64>, usize)> = sums.keys().map(|k| &self.groups[*k]).collect();
-        // Of one machine alone, what is special about it can't be told from what all have.
+        // With one machine, its own residual can't be separated from the common one.
         let several = groups.iter().any(|g| g.1 != groups[0].1);
         let covariance = Array2::from_shape_fn((groups.len(), groups.len()), |(a, b)| {
             let of_machine = if several && groups[a].1 == groups[b].1 { MACHINE_LN.powi(2) } else { 0.0 };
@@ -230,7 +230,7 @@ impl Groups {
             GroupResidual::covariance(&groups[a].0, &groups[b].0) + of_machine + own
         });
         let root = covariance.cholesky().context("the residual over the load can't be solved")?;
-        // What was special about a machine is dropped: groups at one position count by their sum.
+        // A machine's own residual is dropped: groups at one position are added up.
         let mut residual: Vec<GroupResidual> = Vec::new();
         let (blocks, right): (Vec<_>, Vec<_>) = sums.into_values().unzip();
         for ((at, _), weights) in groups.into_iter().zip(weights(&root, &blocks, &right).rows()) {

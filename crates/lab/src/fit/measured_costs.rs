@@ -13,7 +13,7 @@ use sapwise_tune::hardware::{GpuParameterId, ParameterId, Quantity};
 use sapwise_tune::{Hardware, Model, Parameter};
 use std::sync::Arc;
 
-/// Points that a cost needs.
+/// Fewest points that a cost is fitted to.
 pub(super) const FEWEST_POINTS: usize = 3;
 
 /// Returns the cost of each algorithm that was timed often enough, from the report alone, and a sentence for each
@@ -22,7 +22,7 @@ pub fn measured_costs(profile: &Profile) -> (Vec<AlgorithmCost>, Vec<String>) {
     measured_costs_over(profile, None)
 }
 
-/// Returns the same, with the timings as corrections of what `base` predicts for the algorithms that it knows.
+/// Returns the same. For algorithms that `base` knows, the costs are its predictions, corrected by the timings.
 pub(super) fn measured_costs_over(profile: &Profile, base: Option<&Model>) -> (Vec<AlgorithmCost>, Vec<String>) {
     let all = rows(profile, 0, None);
     let points = |k: usize| all.iter().filter(|r| usize::from(r.algorithm) == k && !r.floor).count();
@@ -98,7 +98,8 @@ mod tests {
 
     #[test]
     fn what_was_timed_in_small_scenes_only_is_not_cheap_in_large_ones() {
-        // Small sizes show the call only: without lower bounds brute force would be the cheapest in all large scenes.
+        // Small sizes show the cost of a call only: without lower bounds brute force would be the cheapest in all
+        // large scenes.
         let mut report = Machine::family()[0].clone().exact().report();
         let brute: AlgorithmId = "brute@cpu1".parse().unwrap();
         for point in &mut report.points {

@@ -78,9 +78,9 @@ fn measure_crossovers(tuning: &mut Tuning, report: &Report) {
 /// Returns the interval of a crossover of the cost curves, from the points of its scenario at which both neighbours
 /// were timed.
 ///
-/// The crossover itself stays where the curves put it, which know all scenarios. If the samples cross elsewhere, the
-/// interval reaches over their crossing; if they don't cross, to the last size. `None` with fewer than three sizes,
-/// or a crossover beyond them.
+/// The position of the crossover stays that of the curves, which are fitted to all scenarios. If the samples cross
+/// elsewhere, the interval reaches over their crossing; if they don't cross, to the last size. `None` with fewer than
+/// three sizes, or a crossover beyond them.
 fn measured_interval(crossover: &Crossover, report: &Report, scenario: &str) -> Option<(f64, f64)> {
     let points = report.points.iter().filter(|p| p.scenario == scenario).filter_map(|point| {
         let samples = |id: &AlgorithmId| Some(&point.timings.iter().find(|t| t.algorithm == *id)?.samples_ns[..]);

@@ -6,9 +6,9 @@ use rayon::prelude::*;
 use sapwise::algorithm::BackendClass;
 use std::collections::BTreeMap;
 
-/// Rows of a method that are kept, about. In the features of its residual each takes 512 bytes.
+/// Approximate number of rows of a method that are kept. In the features of its residual each takes 512 bytes.
 const MOST_ROWS: usize = 30_000;
-/// Rows of a method that each profile adds at least.
+/// Fewest rows of a method that each profile adds.
 const FEWEST_OF_PROFILE: usize = 2;
 
 /// For each method on a class of processor the rows on one thread, or on GPUs, and those on several threads.
@@ -16,7 +16,7 @@ type MethodRows = BTreeMap<(BackendClass, String), [Vec<Row>; 2]>;
 
 /// Returns the rows of all profiles, without a scenario, thinned when there are many.
 pub(super) fn rows_by_method(profiles: &[Profile], without: Option<&str>) -> MethodRows {
-    // If not every profile can add rows, some spread over all do.
+    // If there are too many profiles, evenly spaced ones add rows.
     let step = (profiles.len() * FEWEST_OF_PROFILE).div_ceil(MOST_ROWS).max(1);
     let most = (MOST_ROWS / profiles.len().max(1)).max(FEWEST_OF_PROFILE);
     let of_profile = |(k, profile): (usize, &Profile)| -> MethodRows {
@@ -38,7 +38,7 @@ pub(super) fn rows_by_method(profiles: &[Profile], without: Option<&str>) -> Met
     all
 }
 
-/// Returns at most `most` of the rows, evenly spaced, others for each `turn`.
+/// Returns at most `most` of the rows, evenly spaced. `turn` shifts the selection.
 pub(crate) fn thinned<T>(rows: Vec<T>, most: usize, turn: usize) -> Vec<T> {
     let all = rows.len();
     if all <= most {

@@ -3,7 +3,7 @@
 use crate::fit::robust::{Problem, weighted_median};
 use ndarray::Array1;
 
-/// Rounds of deciding which rows fell back. The answer stands still after two or three.
+/// Rounds of deciding which rows fell back. The answer no longer changes after two or three.
 const ROUNDS: usize = 4;
 /// A row is first assumed to have fallen back if the logarithm of its time over that of the fallback is within this.
 const LIKE: f64 = 0.2;

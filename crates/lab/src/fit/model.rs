@@ -9,7 +9,7 @@ use sapwise_tune::model::{GPU_PREFIX, Range};
 use sapwise_tune::{GpuHardware, Model};
 use std::sync::Arc;
 
-/// Fits a model to the chosen profiles. Returns it with sentences on what was left out and why.
+/// Fits a model to the chosen profiles. Returns it with a sentence for each method that was left out.
 ///
 /// # Errors
 /// When no method could be fitted, or a regression fails.
@@ -26,7 +26,7 @@ pub fn model(designs: &Designs<'_>, chosen: &[bool], name: &str) -> Result<(Mode
 }
 
 /// Returns the ranges of the parameters of machines, then of the GPUs that were timed. Software adapters count only
-/// if there is no real GPU: between them and one card any other would pass for known.
+/// if there is no real GPU: a range from them to one card would hold almost any other GPU.
 fn ranges(profiles: &[&Profile]) -> Vec<Range> {
     let machine = COMPARED
         .into_iter()

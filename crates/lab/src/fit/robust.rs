@@ -19,7 +19,7 @@ pub(crate) struct Problem {
 
 /// Rounds of reweighting, at most.
 const ROUNDS: usize = 15;
-/// The units stand still when no modelled row changes by more than this share.
+/// The iteration ends when no modelled row changes by more than this share.
 const STILL: f64 = 1e-4;
 /// Residuals beyond this many standard deviations count linearly: Huber's constant for 95 % efficiency.
 const HUBER: f64 = 1.345;

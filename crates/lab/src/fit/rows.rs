@@ -19,16 +19,16 @@ pub struct Row {
     pub ns: f64,
     /// That time over the best of the point.
     pub behind: f64,
-    /// The time is a lower bound: the algorithm had left the sweep before this point.
+    /// Whether the time is a lower bound: the algorithm had left the sweep before this point.
     pub floor: bool,
 }
 
 /// An algorithm that left the sweep is assumed to be at least this many times slower than the best at larger sizes,
-/// or half as many times as it last was: it may gain a little on a best that outgrows its caches.
+/// or half of its last ratio: it may gain a little on a best algorithm that outgrows the caches.
 const LEFT_BEHIND: f64 = 2.0;
 
-/// Returns a row for each algorithm and point, and a lower bound for each point of a scenario beyond the last at
-/// which an algorithm was timed, without a scenario. `position` is that of the profile.
+/// Returns a row for each algorithm and point, and a lower bound for each point of a scenario beyond the last one at
+/// which the algorithm was timed. Leaves out the scenario `without`. `position` is that of the profile.
 pub fn rows(profile: &Profile, position: usize, without: Option<&str>) -> Vec<Row> {
     let held = |(_, spot): &(usize, &Spot)| Some(spot.scenario.as_str()) != without;
     let mut rows = Vec::new();

@@ -82,7 +82,7 @@ fn on_cpu(method: &str) -> Vec<(Term, Scale)> {
 const BOX: f64 = 24.0;
 const PAIR: f64 = 8.0;
 
-/// Returns what a frame of a method does on a GPU: dispatches that wait for each other, and the bytes that its
+/// Returns the counts of a frame of a method on a GPU: dispatches that wait for each other, and the bytes that its
 /// kernels read and write for each box and for each pair.
 ///
 /// Counted from the kernels, for 100 000 evenly spread boxes: each element of a buffer once for each kernel that
@@ -107,7 +107,7 @@ fn on_gpus(method: &str) -> Vec<Component> {
         Component::of(Call, GpuRoundTrip),
         Component(vec![(dispatches, Call, GpuDispatch)]),
         Component(vec![(BOX, Objects, GpuUploadByte)]),
-        // What came up or goes down is copied once more.
+        // Uploaded and downloaded data are copied once more.
         Component(vec![(of_box + 2.0 * BOX, Objects, GpuMemoryByte), (of_pair + 2.0 * PAIR, Pairs, GpuMemoryByte)]),
     ];
     // The nodes that a box is tested with.

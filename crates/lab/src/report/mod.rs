@@ -1,4 +1,4 @@
-//! One machine, one day: what was measured, and nothing that was concluded.
+//! Reports: the measurements of one machine on one day, without conclusions.
 
 mod record;
 mod text;

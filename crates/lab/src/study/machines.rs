@@ -17,7 +17,7 @@ pub(super) const PAPER: [(&str, GpuParameterId); 7] = [
     ("cores", GpuParameterId::Lanes),
 ];
 
-/// Letters of a value at most: one that can't be, such as 1e300, has hundreds of digits.
+/// Most letters of a value: an impossible one, such as 1e300, has hundreds of digits.
 const MOST_LETTERS: usize = 24;
 
 pub(super) fn section(material: &Material, page: &mut Page) {

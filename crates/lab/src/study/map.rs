@@ -17,7 +17,7 @@ use std::collections::BTreeSet;
 /// Cells on either axis.
 const ACROSS: usize = 24;
 const UP: usize = 16;
-/// Boxes of the scene of a cell at most: beyond, the load of so many is scaled.
+/// Most boxes of the scene of a cell. The load of larger cells is scaled from that of this number.
 const MOST_BOXES: u32 = 20_000;
 const SEED: u64 = 1;
 
@@ -48,8 +48,8 @@ pub(super) fn section(material: &Material, page: &mut Page) -> Result<()> {
     Ok(())
 }
 
-/// The map of a profile, and what was held out of the training of its predicted side, which a single report doesn't
-/// have.
+/// Returns the map of a profile, and the name of the part that was held out for its predicted side. A single report
+/// has no predicted side.
 fn map(material: &Material, profile: &Profile) -> Result<(FieldMap, Option<String>)> {
     let tuning = material.profiles.iter().zip(&material.tunings).find(|(p, _)| std::ptr::eq(*p, profile));
     let measured = tuning.and_then(|(_, tuning)| tuning.as_ref()).map(|t| &t.costs[..]).unwrap_or_default();
@@ -103,19 +103,19 @@ fn map(material: &Material, profile: &Profile) -> Result<(FieldMap, Option<Strin
     Ok((map, other.map(|(_, held_out)| held_out)))
 }
 
-/// The load of unit cubes spread evenly, each in so many pairs.
+/// Returns the load of unit cubes spread evenly, each in this number of pairs.
 fn spread_evenly(objects: f64, pairs_of_object: f64, moved: f64) -> Load {
     let objects = objects.round().max(2.0) as u32;
     let few = objects.min(MOST_BOXES);
-    // Two cubes overlap when their middles differ by at most one on each axis: 8 of the volume, half as many pairs as
-    // neighbours.
+    // Two cubes overlap if their middles differ by at most one on each axis, a volume of 8. There are half as many
+    // pairs as neighbours.
     let edge = (4.0 * f64::from(few) / pairs_of_object).cbrt() as f32;
     let mut random = Random::named(SEED, &["map"]);
     let mut middle = || [(); 3].map(|()| random.uniform() as f32 * edge);
     let boxes: Vec<Aabb> = (0..few).map(|_| Aabb::cube(middle(), 0.5)).collect();
     let load = Load::estimate(&boxes, Some(f64::from(few) * pairs_of_object), None);
-    // The world grows with its objects: pairs and strips grow as they do, and an axis with the power 5/3, since each
-    // object shares it with as many as its cross-section holds.
+    // The world grows with its objects. Pairs and candidates in strips grow in proportion, candidates on an axis with
+    // the power 5/3: each object shares the axis with all objects in its slab.
     let growth = f64::from(objects) / f64::from(few);
     Load::of_objects(objects)
         .with_candidates(load.axis_candidates * growth.powf(5.0 / 3.0), load.strip_candidates * growth)
@@ -134,7 +134,7 @@ mod tests {
         assert_eq!((small.pairs, large.pairs), (10_000.0, 80_000.0));
         let growth = large.axis_candidates / small.axis_candidates;
         assert!((growth - 32.0).abs() < 0.1, "{growth}");
-        // And the scene has about as many pairs as it says.
+        // The scene has about the stated number of pairs.
         let edge = (4.0 * 4000.0 / 0.5_f64).cbrt() as f32;
         let mut random = Random::named(SEED, &["map"]);
         let boxes: Vec<Aabb> =

@@ -30,7 +30,7 @@ use std::path::{Path, PathBuf};
 /// The page of a study.
 pub const PAGE: &str = "index.html";
 
-/// What a study wrote.
+/// The result of a study.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct Summary {
@@ -42,18 +42,18 @@ pub struct Summary {
     pub hosts: usize,
     /// The files in the folder, the page first.
     pub files: Vec<String>,
-    /// What could not be shown, and why.
+    /// Sentences about figures that could not be shown.
     pub missing: Vec<String>,
-    /// What was left out of the training, and what its validation does not say.
+    /// Sentences about reports that were left out of the training, and about the limits of its validation.
     pub notes: Vec<String>,
 }
 
-/// What was read, and what follows from it.
+/// The reports of a study, with the results that its sections show.
 struct Material {
     reports: Vec<(String, Report)>,
     /// The studied ones, without samples.
     profiles: Vec<Profile>,
-    /// The measured tuning of each of them in its usual scenario, where it has enough sizes.
+    /// The measured tuning of each of them in its usual scenario, if it has enough sizes.
     tunings: Vec<Option<Tuning>>,
     /// `None` when no model could be fitted.
     trained: Option<Trained>,
@@ -103,12 +103,12 @@ pub fn study(reports: &[PathBuf], out: &Path, made: &str, progress: &dyn Progres
     })
 }
 
-/// Sees that the folder takes a study before the work: it is new, empty, or holds an earlier one.
+/// Checks before the work that the folder takes a study: it is new, empty, or holds an earlier one.
 fn prepare(out: &Path) -> Result<()> {
     fs::create_dir_all(out).with_context(|| format!("the folder {} can't be made", out.display()))?;
     tempfile::tempfile_in(out).with_context(|| format!("no file can be made in {}", out.display()))?;
     let earlier = fs::read_to_string(out.join(PAGE)).is_ok_and(|text| text.starts_with(page::HEAD));
-    // What a study that was killed has left does not count.
+    // Temporary files of a study that was killed do not count.
     let occupied = fs::read_dir(out)?.flatten().any(|entry| !is_temporary(&entry.file_name()));
     if occupied && !earlier {
         bail!("{} is not empty and holds no earlier study; name a new folder with --out", out.display());
@@ -120,7 +120,7 @@ impl Material {
     /// # Errors
     /// When the user asked to stop.
     fn new(reports: Vec<(String, Report)>, progress: &dyn Progress) -> Result<Self> {
-        // Published parameters come without timings, which is no news.
+        // Published parameters have no timings, so leaving them out needs no note.
         let timed = reports.iter().filter(|(_, report)| report.label != Label::Published);
         let mut selection = Selection::default();
         timed.for_each(|(file, report)| selection.add(Selection::reduce(file, report)));
@@ -189,7 +189,7 @@ impl Material {
     }
 }
 
-/// What the page calls a report.
+/// Returns the name of a report on the page.
 fn title(profile: &Profile) -> &str {
     profile.file.strip_suffix(".json").unwrap_or(&profile.file)
 }

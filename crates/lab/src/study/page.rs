@@ -3,7 +3,7 @@
 use crate::figures::plain;
 use std::fmt::Write;
 
-/// What stands before the sections. The name of the generator marks a folder as that of a study.
+/// The text before the sections. The name of the generator marks the folder of a study.
 pub(super) const HEAD: &str = include_str!("head.html");
 
 /// A page under way.
@@ -12,7 +12,7 @@ pub(super) struct Page {
     body: String,
     /// The files beside it: figures, and tables.
     pub(super) files: Vec<(&'static str, String)>,
-    /// What could not be shown, and why.
+    /// Sentences about figures that could not be shown.
     pub(super) missing: Vec<String>,
 }
 
@@ -25,7 +25,7 @@ impl Page {
         self.push(format_args!("<p>{}</p>", escaped(text)));
     }
 
-    /// Says what is missing and why.
+    /// Adds a sentence about a missing figure.
     pub(super) fn lacks(&mut self, what: &str) {
         self.push(format_args!("<p class=\"lacks\">{}</p>", escaped(what)));
         self.missing.push(what.to_owned());

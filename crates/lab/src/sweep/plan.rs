@@ -11,10 +11,10 @@ use std::time::Duration;
 pub struct Plan {
     /// In the order of measurement.
     pub ascents: Vec<Ascent>,
-    /// Rounds of visits, minutes apart: what the host does differs between them, so that medians over several rounds
-    /// are worth more than as many samples at once.
+    /// Rounds of visits, minutes apart. The load of the host differs between them, so medians over several rounds are
+    /// more reliable than the same number of samples at once.
     pub rounds: u32,
-    /// Time for everything. The visits get what the ascents leave.
+    /// Time for everything. The visits get the time that the ascents leave.
     pub total: Duration,
 }
 
@@ -50,8 +50,8 @@ const FULL: [Scenario; 10] = [
     Scenario::FreeFall,
     Scenario::Resting,
 ];
-/// Hard scenarios show how slow a method gets, not where one overtakes another: one size a decade and a quarter of
-/// the time.
+/// Hard scenarios show how slow a method gets, not its crossovers: one size a decade and a quarter of the time are
+/// enough.
 const HARD_PER_DECADE: u32 = 1;
 const HARD_SHARE: f64 = 0.25;
 /// Smaller scenes are not hard.

@@ -43,7 +43,7 @@ pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Ou
         None => error,
     };
     let origin = read.map_or_else(|| tuning::predicted(arguments, algorithms), Ok);
-    // First: a prediction that was interrupted may complain of what was not measured.
+    // Checked before the error of the prediction: an interrupted one may complain about missing measurements.
     interrupt::check().map_err(recorded)?;
     let mut origin = origin?;
     let gpu_warnings = tuning::add_gpus(&mut registry, &origin.tuning, &arguments.gpus)?;
@@ -89,10 +89,10 @@ fn check_outputs(arguments: &Run) -> anyhow::Result<()> {
     outputs::check(&read, &outputs)
 }
 
-/// What to replay.
+/// Returns the settings of the replay.
 ///
 /// # Errors
-/// When the stream can't be read, holds what no algorithm takes, or is asked for what only a scenario has.
+/// When the stream can't be read, has no frames or an unsound one, or gets options that only a scenario has.
 fn settings(arguments: &Run) -> anyhow::Result<ReplaySettings> {
     let asked = arguments.frames.map(|frames| frames as usize);
     let (source, frames) = match &arguments.scene {

@@ -1,4 +1,4 @@
-//! Where the tuning of a run comes from.
+//! The source of the tuning of a run.
 
 use crate::algorithms::Algorithms;
 use crate::args::Run;

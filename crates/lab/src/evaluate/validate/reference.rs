@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 
-/// What the script prints: the numbers of each line by its first word. `None` without Python, which
+/// Returns the output of the script: the numbers of each line, by its first word. `None` without Python, which
 /// `SAPWISE_REQUIRE_PYTHON=1` forbids.
 fn printed(folder: &Path, first: &str, files: &[String]) -> Option<BTreeMap<String, Vec<f64>>> {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tools/reference/regret.py");

@@ -35,7 +35,7 @@ fn physics_beats_every_constant_and_near_crossovers_on_machines_held_out() {
         );
         assert!(m.mean_regret >= 0.0, "{m:?}");
     }
-    // Crossovers are judged where costs are predicted.
+    // Crossovers are judged for strategies that predict costs.
     let of = |name: &str| {
         let score = validation.methods.iter().find(|m| m.name == name).unwrap();
         score.crossing_error_octaves.zip(score.crossings_within_half_octave)

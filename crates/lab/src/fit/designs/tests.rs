@@ -21,7 +21,7 @@ fn whole(profiles: &[Profile]) -> (Model, Vec<String>) {
     (model, [designs.notes, notes].concat())
 }
 
-/// What a model predicts for the measured rows of a profile over what was measured.
+/// Returns predicted over measured time for the measured rows of a profile.
 fn ratios(model: &Model, profile: &Profile, of: impl Fn(&AlgorithmId) -> bool) -> Vec<f64> {
     let costs = model.predict(&profile.hardware, &profile.with_revisions(&profile.available())).unwrap().costs;
     let rows = rows(profile, 0, None).into_iter().filter(|r| !r.floor && of(profile.id(r.algorithm)));
@@ -133,7 +133,7 @@ fn a_scenario_that_is_left_out_is_not_looked_at() {
     let mut all = profiles(Machine::family().into_iter().take(3));
     let fit = |all: &[Profile]| Designs::without(all, Some("clustered")).fit(&[true; 3]).unwrap().0;
     let before = fit(&all);
-    // A hundred times as slow there, but for who is best: what lies how far behind is a weight.
+    // All algorithms take 100 times as long there, so their ratios to the best, which are weights, stay.
     for spot in all.iter_mut().flat_map(|p| &mut p.points).filter(|s| s.scenario == "clustered") {
         spot.medians.iter_mut().for_each(|m| m.1 *= 100.0);
     }
