@@ -22,9 +22,7 @@ pub(crate) fn measure_hardware(threads: Option<u32>, choice: &GpuChoice) -> anyh
     if hardware.implausible().is_some() && !interrupt::requested() {
         hardware = measure_cpu(threads);
     }
-    let mut measured = gpus::measure(choice, threads)?;
-    hardware.gpus = std::mem::take(&mut measured.gpus);
-    hardware.gpu_groups = std::mem::take(&mut measured.groups);
+    let measured = gpus::measure(choice, threads, &mut hardware)?;
     Ok((hardware, measured))
 }
 

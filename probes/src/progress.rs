@@ -44,11 +44,6 @@ impl Progress {
         self.bar.set_position(steps);
     }
 
-    /// Sets the number of all steps.
-    pub(crate) fn steps(&self, steps: u64) {
-        self.bar.set_length(steps);
-    }
-
     /// Prints something while the bar is out of the way.
     pub(crate) fn aside<T>(&self, print: impl FnOnce() -> T) -> T {
         self.bar.suspend(print)

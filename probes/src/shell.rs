@@ -54,10 +54,8 @@ mod tests {
 
     #[test]
     fn words_that_a_shell_would_take_apart_are_quoted() {
-        assert_eq!(
-            [quoted("a-b/c.json"), quoted("a b"), quoted("it's"), quoted("")],
-            ["a-b/c.json", "'a b'", "'it'\\''s'", "''"]
-        );
+        let words = ["a-b/c.json", "a b", "it's", ""].map(quoted);
+        assert_eq!(words, ["a-b/c.json", "'a b'", "'it'\\''s'", "''"]);
     }
 
     #[test]

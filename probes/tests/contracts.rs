@@ -98,10 +98,8 @@ fn run_keeps_its_contract() {
                 left_out best_fixed over_best_fixed over_windows switches";
     let keys: Vec<&str> = keys.split(' ').collect();
     assert_keys(&told, &keys);
-    assert_eq!(
-        (&told["scenario"], &told["frames"], &told["repeats"]),
-        (&"fragmentation".into(), &30.into(), &2.into())
-    );
+    assert_eq!((&told["scenario"], &told["frames"]), (&"fragmentation".into(), &30.into()));
+    assert_eq!(told["repeats"], 2);
     assert_eq!((&told["source"], &told["interrupted"]), (&"measured".into(), &false.into()));
     assert_keys(&told["objects"], &["min", "max"]);
     assert_keys(&told["adaptive"], &["total_ms", "median_ms", "p99_ms", "worst_ms"]);

@@ -17,12 +17,6 @@ fn probe(node: &str, folder: &Path) -> assert_cmd::Command {
     command
 }
 
-fn reports(folder: &Path) -> Vec<PathBuf> {
-    let mut files: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
-    files.sort();
-    files
-}
-
 fn change(path: &Path, change: impl FnOnce(&mut sapwise_lab::Report)) {
     let mut report = sapwise_lab::report::read(&fs::read_to_string(path).unwrap()).unwrap().value;
     change(&mut report);
@@ -33,7 +27,7 @@ fn change(path: &Path, change: impl FnOnce(&mut sapwise_lab::Report)) {
 fn a_node_measures_once_into_a_shared_folder_and_again_what_was_cut_short() {
     let folder = tempfile::tempdir().unwrap();
     success(&mut probe("qx-first", folder.path()));
-    let files = reports(folder.path());
+    let files: Vec<PathBuf> = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
     let [file] = &files[..] else { panic!("not one report") };
     let (name, text) = (file.file_name().unwrap().to_str().unwrap(), fs::read_to_string(file).unwrap());
     assert!(!name.contains("qx-") && !text.contains("qx-"), "{name}");

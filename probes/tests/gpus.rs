@@ -5,6 +5,8 @@ mod common;
 #[cfg(feature = "long-tests")]
 use common::failure;
 use common::{answer, devices_with_a_gpu, list, npy, output, renew, sapwise, success, tuning, without_adapters, write};
+#[cfg(feature = "long-tests")]
+use sapwise_lab::Report;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,7 +16,7 @@ use std::path::{Path, PathBuf};
 const TINY: [&str; 6] = ["probe", "--scenario", "uniform", "--max-objects", "20", "--json"];
 
 #[cfg(feature = "long-tests")]
-fn report(command: &mut assert_cmd::Command) -> sapwise_lab::Report {
+fn report(command: &mut assert_cmd::Command) -> Report {
     sapwise_lab::report::read(&success(command)).unwrap().value
 }
 
@@ -218,12 +220,8 @@ fn a_driver_that_crashes_costs_the_gpus_and_a_remark() {
         return;
     }
     assert!(devices["remark"].as_str().unwrap().contains("ended by signal 6"), "{devices}");
-    let probed = report(with_it().args(TINY));
-    assert!(
-        probed.remarks.iter().any(|r| r.contains("ended by signal 6")) && probed.points.len() >= 2,
-        "{:?}",
-        probed.remarks
-    );
+    let Report { remarks, points, .. } = report(with_it().args(TINY));
+    assert!(remarks.iter().any(|r| r.contains("ended by signal 6")) && points.len() >= 2, "{remarks:?}");
     let predicted = answer(with_it().args(["predict", "--json"]));
     assert!(predicted["warnings"].to_string().contains("ended by signal 6"), "{predicted}");
     // No driver is loaded, so nothing crashes and nothing is said.

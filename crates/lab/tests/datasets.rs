@@ -5,8 +5,8 @@ use sapwise::Registry;
 use sapwise::algorithm::Entry;
 use sapwise_lab::data::{host, read_reports};
 use sapwise_lab::progress::Silent;
+use sapwise_lab::read_model;
 use sapwise_lab::report::{self, Label, Report};
-use sapwise_lab::{Training, read_model};
 use sapwise_tune::Model;
 use sapwise_tune::hardware::{GpuParameterId, ParameterId};
 use sapwise_tune::model::MethodModel;
@@ -22,15 +22,6 @@ fn reports() -> Vec<(String, Report)> {
     reports.retain(|(_, report)| report.label != Label::Published);
     assert!(!reports.is_empty());
     reports
-}
-
-fn training() -> Training {
-    read_model(&std::fs::read_to_string(repository("models/default.json")).unwrap()).unwrap().training
-}
-
-/// Returns our algorithms on a machine with this number of cores.
-fn algorithms(cores: u32) -> Vec<Entry> {
-    Registry::with_cores(cores).entries().to_vec()
 }
 
 #[test]
@@ -65,7 +56,8 @@ fn every_report_is_complete_and_its_label_is_true() {
 
 #[test]
 fn the_built_in_model_predicts_for_every_report() {
-    let (model, training) = (Model::built_in().unwrap(), training());
+    let (model, stored) = (Model::built_in().unwrap(), repository("models/default.json"));
+    let training = read_model(&std::fs::read_to_string(stored).unwrap()).unwrap().training;
     let reports = reports();
     for trained_on in &training.trained_on {
         assert!(reports.iter().any(|(path, _)| *path == trained_on.file), "{} is gone", trained_on.file);
@@ -75,8 +67,9 @@ fn the_built_in_model_predicts_for_every_report() {
     let most_known = reports.iter().map(|(_, r)| r).filter(|r| is_known(r)).map(cores).max().unwrap();
     for (path, report) in reports {
         let (cores, known) = (cores(&report), is_known(&report));
-        let algorithms = algorithms(cores);
-        let prediction = model.predict(&report.hardware, &algorithms).unwrap();
+        let registry = Registry::with_cores(cores);
+        let algorithms = registry.entries();
+        let prediction = model.predict(&report.hardware, algorithms).unwrap();
         // A new method, or one whose revision has risen, waits for a model that knows it.
         let knows = |e: &&Entry| {
             let method = |m: &&MethodModel| m.method == e.id.method() && m.backend == e.id.backend().class();

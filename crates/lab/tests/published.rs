@@ -35,10 +35,7 @@ fn the_cards_hold_the_figures_of_the_paper_and_nothing_else() {
         assert_eq!(report.label, Label::Published, "{file}");
         assert!(report.provenance.command.starts_with("transcribed from"), "{file}: {}", report.provenance.command);
         assert!(ids.insert(report.hardware.machine.physical_id.clone()), "{file} has the id of another card");
-        assert!(
-            report.points.is_empty() && report.algorithms.is_empty(),
-            "{file}: timings that the paper does not print"
-        );
+        assert!(report.points.is_empty() && report.algorithms.is_empty(), "{file}: the paper prints no timings");
         let [card] = &report.hardware.gpus[..] else { panic!("{file}: not one card") };
         assert_eq!(card.gpu.name, name);
         let of_card = [

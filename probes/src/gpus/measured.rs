@@ -6,20 +6,16 @@ use super::parameters::{group_without_parameters, inert, without_parameters};
 use crate::child::{Ended, answers};
 use crate::progress::{Progress, Steps as _};
 use sapwise_lab::text::once;
-use sapwise_tune::{GpuGroup, GpuHardware, GpuIdentity, GpuParameterId};
+use sapwise_tune::{GpuGroup, GpuHardware, GpuIdentity, GpuParameterId, Hardware};
 use serde::de::DeserializeOwned;
 use std::time::Duration;
 
 /// A real GPU takes seconds; a software adapter may be a hundred times slower.
 const LIMIT: Duration = Duration::from_secs(90);
 
-/// The GPUs of this machine.
+/// The GPUs of this machine, without their parameters.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Measured {
-    /// The GPUs that were taken.
-    pub(crate) gpus: Vec<GpuHardware>,
-    /// GPUs that work together.
-    pub(crate) groups: Vec<GpuGroup>,
     /// The taken GPUs that can be used: their process ended well, and they execute kernels.
     pub(crate) usable: Vec<GpuIdentity>,
     /// The GPUs that were not taken.
@@ -28,11 +24,12 @@ pub(crate) struct Measured {
     pub(crate) remarks: Vec<String>,
 }
 
-/// Looks for GPUs and measures those that are taken, at most a minute and a half for each.
+/// Looks for GPUs, measures those that are taken, at most a minute and a half for each, and adds their parameters to the
+/// hardware.
 ///
 /// # Errors
 /// When no process can be started, or a GPU that was asked for by its number is not there.
-pub(crate) fn measure(choice: &GpuChoice, threads: Option<u32>) -> anyhow::Result<Measured> {
+pub(crate) fn measure(choice: &GpuChoice, threads: Option<u32>, hardware: &mut Hardware) -> anyhow::Result<Measured> {
     let mut measured = Measured::default();
     if choice.no_gpus {
         return Ok(measured);
@@ -49,21 +46,21 @@ pub(crate) fn measure(choice: &GpuChoice, threads: Option<u32>) -> anyhow::Resul
     let (taken, left_out): (Vec<_>, Vec<_>) = seen.identities.into_iter().partition(|g| choice.takes(g));
     measured.left_out = left_out;
     // One more for several GPUs together.
-    progress.steps(taken.len() as u64 + 1);
+    progress.start(taken.len() as u64 + 1);
     for identity in taken {
         progress.message(&format!("hardware: gpu{}", identity.index));
-        measured.gpu(identity, threads)?;
+        hardware.gpus.push(measured.gpu(identity, threads)?);
         progress.advance(1);
     }
     progress.message("hardware: several GPUs together");
-    measured.measure_groups(threads)?;
+    hardware.gpu_groups = measured.groups(threads)?;
     Ok(measured)
 }
 
 impl Measured {
-    fn gpu(&mut self, identity: GpuIdentity, threads: Option<u32>) -> anyhow::Result<()> {
+    fn gpu(&mut self, identity: GpuIdentity, threads: Option<u32>) -> anyhow::Result<GpuHardware> {
         let index = identity.index;
-        let hardware = match part::<GpuHardware>("gpu", &index.to_string(), threads)? {
+        Ok(match part::<GpuHardware>("gpu", &index.to_string(), threads)? {
             Ok(hardware) if hardware.gpu == identity && hardware.value(GpuParameterId::Executes) == Some(0.0) => {
                 self.remarks.push(format!("{}; nothing of it is timed", inert(&identity)));
                 hardware
@@ -80,24 +77,23 @@ impl Measured {
                 self.remarks.push(format!("gpu{index} ({}) is left out: {why}", identity.name));
                 without_parameters(identity, &why)
             }
-        };
-        self.gpus.push(hardware);
-        Ok(())
+        })
     }
 
     /// Measures every set of several GPUs that our algorithms run on.
-    fn measure_groups(&mut self, threads: Option<u32>) -> anyhow::Result<()> {
+    fn groups(&mut self, threads: Option<u32>) -> anyhow::Result<Vec<GpuGroup>> {
+        let mut groups = Vec::new();
         let algorithms = sapwise_gpu::algorithms(&self.usable);
         let sets = once(algorithms.iter().map(|e| uses(&e.id)).filter(|set| set.len() > 1));
         for set in sets {
             let text = sapwise::algorithm::Backend::Gpu(set.to_vec()).to_string();
             let group = part("gpu-group", &text, threads)?;
-            self.groups.push(group.unwrap_or_else(|why| {
+            groups.push(group.unwrap_or_else(|why| {
                 self.remarks.push(format!("{text} could not be measured together: {why}"));
                 group_without_parameters(set, &why)
             }));
         }
-        Ok(())
+        Ok(groups)
     }
 }
 

@@ -34,7 +34,7 @@ const LIMIT: Duration = Duration::from_secs(3600);
 /// A profile that fails is printed, and the next one is measured.
 pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
     if std::env::var_os("SAPWISE_SIMD").is_some_and(|value| !value.is_empty()) {
-        return Err(WrongUsage("--profiles sets SAPWISE_SIMD itself; unset it and run this again".to_owned()).into());
+        bail!(WrongUsage("--profiles sets SAPWISE_SIMD itself; unset it and run this again".to_owned()));
     }
     let cores = usable_cores();
     let default = || Path::new("reports").join(machine_stem(&measure::machine().cpu, cores));
@@ -203,8 +203,7 @@ mod tests {
             assert!(lack("", &|r| r.remarks.push(remark.to_owned())).unwrap().is_some(), "{remark}");
         }
         assert!(lack("--seed=2", &|_| ()).unwrap_err().contains("another command"));
-        assert!(
-            lack("", &|r| r.hardware.machine.physical_id = "1".repeat(16)).unwrap_err().contains("another machine")
-        );
+        let elsewhere = lack("", &|r| r.hardware.machine.physical_id = "1".repeat(16));
+        assert!(elsewhere.unwrap_err().contains("another machine"));
     }
 }

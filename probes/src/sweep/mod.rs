@@ -9,5 +9,5 @@ mod verify;
 mod visits;
 
 pub(crate) use request::SweepRequest;
-pub(crate) use runner::{Conditions, Found, sweep_all};
+pub(crate) use runner::{Found, sweep_all};
 pub(crate) use scenario::sweep;

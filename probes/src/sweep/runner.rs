@@ -29,30 +29,27 @@ pub(crate) struct Found {
     pub(crate) interrupted: bool,
 }
 
-/// The conditions of all scenarios of a sweep.
-pub(crate) struct Conditions {
-    pub(crate) cores: u32,
-    pub(crate) seed: u64,
-    /// The GPUs to sweep.
-    pub(crate) gpus: Vec<GpuIdentity>,
-}
-
-/// Sweeps every scenario of a plan, and calls `keep` after each one, so that nothing measured is lost.
+/// Sweeps every scenario of a plan on a number of cores and on some GPUs, and calls `keep` after each one, so that nothing measured is lost.
 ///
 /// # Errors
 /// When no process can be started. A scenario that crashes is a remark, not an error.
-pub(crate) fn sweep_all(plan: &Plan, conditions: &Conditions, keep: &mut dyn FnMut(&Found)) -> anyhow::Result<Found> {
+pub(crate) fn sweep_all(
+    plan: &Plan,
+    cores: u32,
+    seed: u64,
+    gpus: Vec<GpuIdentity>,
+    keep: &mut dyn FnMut(&Found),
+) -> anyhow::Result<Found> {
     let began = Instant::now();
     let progress = Progress::new(plan.total.as_secs());
-    let gpus = conditions.gpus.clone();
-    let mut sweep = Sweep { plan, conditions, gpus, began, progress, found: Found::default() };
+    let mut sweep = Sweep { plan, cores, seed, gpus, began, progress, found: Found::default() };
     for ascent in &plan.ascents {
         if !sweep.go(&ascent.scenario.to_string(), Schedule::Ascent(ascent.sizes.clone()), ascent.time, 0)? {
             return Ok(sweep.found);
         }
         keep(&sweep.found);
     }
-    let mut shuffle = Random::new(conditions.seed);
+    let mut shuffle = Random::new(seed);
     for round in 1..=plan.rounds {
         let left = plan.total.saturating_sub(began.elapsed()) / (plan.rounds + 1 - round);
         let starts = START * plan.ascents.len() as u32;
@@ -77,7 +74,8 @@ pub(crate) fn sweep_all(plan: &Plan, conditions: &Conditions, keep: &mut dyn FnM
 /// A sweep under way.
 struct Sweep<'a> {
     plan: &'a Plan,
-    conditions: &'a Conditions,
+    cores: u32,
+    seed: u64,
     /// The GPUs that are still trusted.
     gpus: Vec<GpuIdentity>,
     began: Instant,
@@ -120,9 +118,9 @@ impl Sweep<'_> {
         let request = SweepRequest {
             scenario: scenario.to_owned(),
             schedule,
-            cores: self.conditions.cores,
+            cores: self.cores,
             // Another scene each round: a property of one scene must not look like one of the machine.
-            seed: self.conditions.seed.wrapping_add(round),
+            seed: self.seed.wrapping_add(round),
             seconds: time.as_secs_f64(),
             gpus: self.gpus.clone(),
         };

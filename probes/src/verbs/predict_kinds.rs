@@ -19,16 +19,14 @@ use std::path::Path;
 
 pub(super) fn run(folder: &Path, arguments: &Predict, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
     let Some(out) = arguments.out.as_deref().filter(|_| !arguments.json) else {
-        let why = format!(
+        bail!(WrongUsage(format!(
             "{} is a folder: name one report in it, or add `--out FOLDER` (without --json) for one tuning a machine",
             folder.display()
-        );
-        return Err(WrongUsage(why).into());
+        )));
     };
     // The next call would take the tunings for reports.
     if outputs::place(out).starts_with(outputs::place(folder)) {
-        let why = format!("{} holds the reports; name a folder elsewhere for the tunings", folder.display());
-        return Err(WrongUsage(why).into());
+        bail!(WrongUsage(format!("{} holds the reports; name a folder elsewhere for the tunings", folder.display())));
     }
     let model = prediction::model(arguments.model.as_deref())?.model;
     interrupt::listen()?;

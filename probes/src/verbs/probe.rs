@@ -6,7 +6,7 @@ use crate::destination::Destination;
 use crate::exit::Outcome;
 use crate::flaw::flaw;
 use crate::hardware::{self, measure_hardware};
-use crate::sweep::{Conditions, Found, sweep_all};
+use crate::sweep::{Found, sweep_all};
 use crate::terminal::Terminal;
 use crate::{child, interrupt, node, output, profiles, provenance, summary};
 use anyhow::Context;
@@ -23,7 +23,9 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
         return profiles::run(arguments, algorithms);
     }
     let began = Instant::now();
-    let plan = plan(arguments)?;
+    hardware::check_threads(arguments.threads)?;
+    let scenarios = arguments.scenarios();
+    let plan = (!arguments.hardware_only).then(|| Plan::new(arguments.quick, &scenarios, arguments.max_objects));
     let in_folder = arguments.out.as_deref().filter(|out| out.is_dir()).map(node::report_in);
     if let Some(path) = in_folder.as_deref().filter(|path| path.exists())
         && let Some(there) = good(path, arguments, algorithms)?
@@ -53,12 +55,8 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
         found.remarks.push("interrupted during the hardware parameters; the rest is missing".to_owned());
         found.interrupted = true;
     } else if let Some(plan) = &plan {
-        let conditions = Conditions {
-            cores: arguments.threads.unwrap_or_else(usable_cores),
-            seed: arguments.seed,
-            gpus: measured.usable,
-        };
-        found = sweep_all(plan, &conditions, &mut |so_far| {
+        let cores = arguments.threads.unwrap_or_else(usable_cores);
+        found = sweep_all(plan, cores, arguments.seed, measured.usable, &mut |so_far| {
             if let Some(destination) = &destination {
                 let mut so_far = so_far.clone();
                 so_far.remarks.splice(0..0, before.iter().cloned());
@@ -118,13 +116,6 @@ fn good(path: &Path, arguments: &Probe, algorithms: &Algorithms) -> anyhow::Resu
         );
     }
     Ok(Some(there))
-}
-
-/// Returns the plan of the sweep; `None` with `--hardware-only`.
-fn plan(arguments: &Probe) -> anyhow::Result<Option<Plan>> {
-    hardware::check_threads(arguments.threads)?;
-    let scenarios = arguments.scenarios();
-    Ok((!arguments.hardware_only).then(|| Plan::new(arguments.quick, &scenarios, arguments.max_objects)))
 }
 
 fn assemble(arguments: &Probe, algorithms: &Algorithms, hardware: &Hardware, found: Found, began: Instant) -> Report {

@@ -49,9 +49,8 @@ pub(super) struct Seen<'a> {
 /// Everything that was fitted to the training profiles of a fold.
 pub(super) struct Fitted<'a> {
     seen: &'a Seen<'a>,
-    /// Positions of the training profiles, and the parameters that their machines are compared by.
+    /// Positions of the training profiles.
     known: Vec<usize>,
-    likeness: Vec<&'a Likeness>,
     /// These profiles with the mean regret of always choosing each algorithm.
     always: Vec<(&'a Profile, Vec<f64>)>,
     /// The model with its residual, and without; `None` when none could be fitted.
@@ -115,7 +114,6 @@ impl<'a> Material<'a> {
             |k: usize, spot: u32| without.is_some_and(|w| self.profiles[k].points[spot as usize].scenario == w);
         Ok(Fitted {
             seen,
-            likeness: known.iter().map(|&k| &self.likeness[k]).collect(),
             always: known.iter().map(|&k| (&self.profiles[k], always(k))).collect(),
             models,
             forests: self.table.grow(&chosen, left_out)?,
@@ -186,7 +184,8 @@ impl Fitted<'_> {
     ) -> Result<Vec<Contestant<'b>>> {
         let (profile, seen) = (&data.profiles[held], self.seen);
         let always: Vec<(&Profile, &[f64])> = self.always.iter().map(|(p, means)| (*p, &means[..])).collect();
-        let nearest = baselines::nearest(&self.likeness, &data.likeness[held]);
+        let likeness: Vec<&Likeness> = self.known.iter().map(|&k| &data.likeness[k]).collect();
+        let nearest = baselines::nearest(&likeness, &data.likeness[held]);
         let nearest = nearest.map(|k| baselines::of_another(seen.costs(self.known[k]), available));
         let whole = ours.map(|o| &o.whole[..]).unwrap_or_default();
         let physics = ours.map(|o| &o.physics[..]).unwrap_or_default();

@@ -83,9 +83,7 @@ mod tests {
         // The second is off by twice as much. Its limit holds all errors of the first; the limit of the first holds 45
         // of its 100.
         let apart = coverage(&[errors("a", 1.0), errors("b", 2.0)]).unwrap();
-        assert!(
-            (apart.times_90_ln - 1.35).abs() < 1e-9 && (apart.times - (1.0 + 0.455) / 2.0).abs() < 0.01,
-            "{apart:?}"
-        );
+        let times = (1.0 + 0.455) / 2.0;
+        assert!((apart.times_90_ln - 1.35).abs() < 1e-9 && (apart.times - times).abs() < 0.01, "{apart:?}");
     }
 }

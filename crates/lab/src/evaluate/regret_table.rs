@@ -94,7 +94,8 @@ impl RegretTable {
     fn by(profile: &Profile, times: impl Fn(&Spot) -> Vec<(u16, f64)>) -> Self {
         let mut groups: BTreeMap<(&str, i64), Vec<&Spot>> = BTreeMap::new();
         for spot in &profile.points {
-            groups.entry((&spot.scenario, quarter(spot))).or_default().push(spot);
+            let quarter = (PER_DECADE * f64::from(spot.load.objects.max(1)).log10()).round() as i64;
+            groups.entry((&spot.scenario, quarter)).or_default().push(spot);
         }
         let algorithms = profile.algorithms.len();
         // Over the best of each cell.
@@ -160,10 +161,6 @@ impl RegretTable {
 fn summed<'a>(cells: impl Iterator<Item = &'a Cell>, of: impl Fn(&Cell) -> f64) -> Regret {
     let (regrets, weights): (Vec<f64>, Vec<f64>) = cells.map(|c| (of(c), in_games(c.decade))).unzip();
     Regret::of(regrets, weights)
-}
-
-fn quarter(spot: &Spot) -> i64 {
-    (PER_DECADE * f64::from(spot.load.objects.max(1)).log10()).round() as i64
 }
 
 /// Returns how often games have a number of objects with this base-10 logarithm, in proportion.

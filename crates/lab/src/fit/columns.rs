@@ -139,13 +139,9 @@ mod tests {
     #[test]
     fn leverages_by_hand() {
         // 1 / M + (x - mean)^2 / sum of squares, under the weights.
-        let columns = Columns::new(&array![[1.0], [2.0], [3.0], [6.0]], &[1.0; 4]);
+        let leverages = Columns::new(&array![[1.0], [2.0], [3.0], [6.0]], &[1.0; 4]).leverages();
         let expected = [0.25 + 4.0 / 14.0, 0.25 + 1.0 / 14.0, 0.25, 0.25 + 9.0 / 14.0];
-        assert!(
-            columns.leverages().iter().zip(expected).all(|(h, e)| (h - e).abs() < 1e-12),
-            "{:?}",
-            columns.leverages()
-        );
+        assert!(leverages.iter().zip(expected).all(|(h, e)| (h - e).abs() < 1e-12), "{leverages:?}");
         // A row of weight two has the leverage of two rows.
         let twice = Columns::new(&array![[1.0], [2.0], [3.0], [3.0], [6.0]], &[1.0; 5]).leverages();
         let weighted = Columns::new(&array![[1.0], [2.0], [3.0], [6.0]], &[1.0, 1.0, 2.0, 1.0]).leverages();

@@ -84,7 +84,7 @@ pub(super) fn corrected(mut costs: Vec<AlgorithmCost>, profile: &Profile, rows: 
     };
     let timings: Vec<Timing<'_>> = rows.iter().filter(|r| !r.floor).filter_map(timing).collect();
     let (found, left) = Parts::new(&costs, curve).fit(&timings);
-    for (k, (cost, Found { constant, curve })) in costs.iter_mut().zip(found).enumerate() {
+    for (k, (cost, (constant, curve))) in costs.iter_mut().zip(found).enumerate() {
         let by_motion = by_motion(cost);
         let none = || Residual::new(Arc::clone(&basis.places), Vec::new(), by_motion);
         let residual = cost.curve.residual.get_or_insert_with(none);
@@ -108,10 +108,7 @@ fn by_motion(cost: &AlgorithmCost) -> bool {
 }
 
 /// The correction of one cost: the natural logarithm of a factor, and the weights of the functions of the load.
-struct Found {
-    constant: f64,
-    curve: Vec<f64>,
-}
+type Correction = (f64, Vec<f64>);
 
 /// The shared parts of some costs.
 struct Parts<'a> {
@@ -145,7 +142,7 @@ impl<'a> Parts<'a> {
     }
 
     /// Returns the correction of each cost, and the error of each timing that is left.
-    fn fit(&self, timings: &[Timing<'_>]) -> (Vec<Found>, Vec<f64>) {
+    fn fit(&self, timings: &[Timing<'_>]) -> (Vec<Correction>, Vec<f64>) {
         let size = self.own(self.of_cost.len());
         let features: Vec<_> = timings.iter().map(|t| self.features(t.algorithm, t.curve)).collect();
         let mut normal: Array2<f64> = Array2::eye(size);
@@ -173,7 +170,7 @@ impl<'a> Parts<'a> {
             let none = Array1::zeros(self.curve);
             let constant = self.features(k, none.view()).iter().map(|&(a, x)| x * weights[a]).sum();
             let curve = weights.iter().skip(self.own(k) + 1).take(self.curve);
-            Found { constant, curve: curve.map(|w| CURVE_LN * w).collect() }
+            (constant, curve.map(|w| CURVE_LN * w).collect())
         };
         ((0..self.of_cost.len()).map(found).collect(), left)
     }

@@ -82,27 +82,21 @@ fn on_cpu(method: &str) -> Vec<(Term, Scale)> {
 const BOX: f64 = 24.0;
 const PAIR: f64 = 8.0;
 
-/// Returns the counts of a frame of a method on a GPU: dispatches that wait for each other, and the bytes that its
-/// kernels read and write for each box and for each pair.
+/// Returns the components of a frame on GPUs: dispatches that wait for each other, the bytes that the kernels read and
+/// write for each box and for each pair, and the transfers.
 ///
-/// Counted from the kernels, for 100 000 evenly spread boxes: each element of a buffer once for each kernel that
-/// touches it.
-pub(crate) fn gpu_counts(method: &str) -> Option<(f64, f64, f64)> {
-    match method {
-        "sap" => Some((14.0, 204.25, 36.1345)),
-        "grid-sap" => Some((11.0, 204.9887, 36.1345)),
-        "bvh" => Some((16.0, 245.4643, 36.1345)),
-        _ => None,
-    }
-}
-
-/// Dispatches and bytes are counted; a fit finds only by how much a dispatch or a byte of the method is more
-/// expensive than one that a hardware parameter was measured with. A card that was not measured is assumed to have
-/// the same ratios.
+/// Dispatches and bytes are counted from the kernels, for 100 000 evenly spread boxes: each element of a buffer once for
+/// each kernel that touches it. A fit finds only by how much a dispatch or a byte of the method is more expensive than
+/// one that a hardware parameter was measured with. A card that was not measured is assumed to have the same ratios.
 fn on_gpus(method: &str) -> Vec<Component> {
     use {Scale::*, Term::*};
-    // Brute force is not counted: it reads each box once.
-    let (dispatches, of_box, of_pair) = gpu_counts(method).unwrap_or((1.0, BOX, PAIR));
+    let (dispatches, of_box, of_pair) = match method {
+        "sap" => (14.0, 204.25, 36.1345),
+        "grid-sap" => (11.0, 204.9887, 36.1345),
+        "bvh" => (16.0, 245.4643, 36.1345),
+        // Brute force is not counted: it reads each box once.
+        _ => (1.0, BOX, PAIR),
+    };
     let mut list = vec![
         Component::of(Call, GpuRoundTrip),
         Component(vec![(dispatches, Call, GpuDispatch)]),

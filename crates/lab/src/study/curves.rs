@@ -188,9 +188,8 @@ mod tests {
         let reports = vec![("a.json".to_owned(), Machine::family()[2].report())];
         let material = Material::new(reports, &crate::progress::Silent).unwrap();
         let profile = &material.profiles[0];
-        assert!(
-            Compared::Threads.is_in(profile) && !Compared::Gpus.is_in(profile) && !Compared::CpuAndGpu.is_in(profile)
-        );
+        let is_in = [Compared::Threads, Compared::Gpus, Compared::CpuAndGpu].map(|compared| compared.is_in(profile));
+        assert_eq!(is_in, [true, false, false]);
         let panel = panel(&material, profile, Compared::Threads);
         assert!(panel.curves.len() > 1 && panel.curves[0].name == "1 thread", "{panel:?}");
         let spot = profile.points.iter().find(|s| s.scenario == profile.usual_scenario()).unwrap();

@@ -102,11 +102,8 @@ fn settings(arguments: &Run) -> anyhow::Result<ReplaySettings> {
                 if *scenario == Scenario::Fragmentation { Scenario::FRAGMENTATION_FRAMES as usize } else { FRAMES };
             let frames = asked.unwrap_or(usual);
             if let Some(least) = arguments.swing.filter(|&least| least as usize > objects) {
-                return Err(WrongUsage(format!(
-                    "--swing {least}: more than the {}; raise --objects",
-                    count(objects, "object")
-                ))
-                .into());
+                let objects = count(objects, "object");
+                bail!(WrongUsage(format!("--swing {least}: more than the {objects}; raise --objects")));
             }
             let swing = arguments.swing.map(|least| Swing { least: least as usize, frames });
             (FrameSource::Scene { scenario: *scenario, objects, seed: arguments.seed, swing }, frames)
@@ -115,14 +112,13 @@ fn settings(arguments: &Run) -> anyhow::Result<ReplaySettings> {
             let given = [arguments.objects.is_some(), arguments.swing.is_some(), arguments.record.is_some()];
             if let Some((option, _)) = ["--objects", "--swing", "--record"].iter().zip(given).find(|(_, given)| *given)
             {
-                let why = format!("{option}: {} is a stream, whose boxes are recorded", path.display());
-                return Err(WrongUsage(why).into());
+                bail!(WrongUsage(format!("{option}: {} is a stream, whose boxes are recorded", path.display())));
             }
             let frames = read_stream(path)?;
             let own = frames.len();
             if let Some(asked) = asked.filter(|&asked| asked > own) {
                 let why = format!("--frames {asked}: {} has {}; ask for no more", path.display(), count(own, "frame"));
-                return Err(WrongUsage(why).into());
+                bail!(WrongUsage(why));
             }
             let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
             (FrameSource::Stream { name, frames }, asked.unwrap_or(own))
