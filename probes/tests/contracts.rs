@@ -1,9 +1,10 @@
-//! The JSON of `train`, `predict` and `run`, which other programs read.
+//! The JSON of `train`, `predict`, `run` and `study`, which other programs read.
 
 mod common;
 
 use common::{answer, failure, list, sapwise, small_report, write};
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -131,4 +132,22 @@ fn the_card_of_the_built_in_model_is_the_one_that_training_writes() {
     let (page, _notes) = card.split_once("\n## Notes\n").unwrap();
     let differs = page.lines().zip(written.lines()).find(|(card, written)| card != written);
     assert!(page == written, "models/README.md differs: {differs:?}");
+}
+
+#[test]
+fn a_study_has_a_page_with_figures_and_tidy_tables() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("study");
+    let datasets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../datasets");
+    let reports = ["intel-xeon-16c/4t.json", "published"].map(|name| datasets.join(name));
+    let answer = answer(sapwise().arg("study").args(&reports).arg("--json").arg("--out").arg(&out));
+    assert_eq!((&answer["reports"], &answer["studied"], &answer["hosts"]), (&4.into(), &1.into(), &1.into()));
+    let page = fs::read_to_string(out.join("index.html")).unwrap();
+    assert!(page.contains("Quadro FX 5800") && page.contains("4 threads") && !page.contains("Figure 9: no report"));
+    let mut timings = csv::Reader::from_path(out.join("timings.csv")).unwrap();
+    let rows: Vec<BTreeMap<String, String>> = timings.deserialize().map(Result::unwrap).collect();
+    let is_own = |r: &&BTreeMap<String, String>| r["algorithm"] == "grid-sap@cpu4" && r["threads"] == "4";
+    assert!(rows.iter().find(is_own).unwrap()["median_ns"].parse::<f64>().unwrap() > 0.0);
+    // The folder is of this machine alone.
+    assert!(!page.contains(folder.path().to_str().unwrap()));
 }

@@ -9,9 +9,12 @@ use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Writes a tuning that runs the first algorithm below a number of objects and the second from there on.
-fn steps(folder: &Path, first: &str, crossover: u32, second: &str) -> PathBuf {
-    write(folder, "steps.json", tuning(&[(0, first), (crossover, second)]).to_string())
+/// Makes a folder with a tuning that runs `brute` below a number of objects and `grid-sap` from there on.
+fn steps(crossover: u32) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let steps = tuning(&[(0, "brute@cpu1"), (crossover, "grid-sap@cpu1")]);
+    let path = write(folder.path(), "steps.json", steps.to_string());
+    (folder, path)
 }
 
 /// Writes a tuning with the costs of `grid-sap` on one thread and on `threads`.
@@ -40,8 +43,7 @@ fn run(scene: impl AsRef<std::ffi::OsStr>, tuning: &Path, words: &[&str]) -> ass
 
 #[test]
 fn a_recorded_scene_is_run_and_searched_like_the_scene() {
-    let folder = tempfile::tempdir().unwrap();
-    let tuning = steps(folder.path(), "brute@cpu1", 20, "grid-sap@cpu1");
+    let (folder, tuning) = steps(20);
     let stream = folder.path().join("stream.npy");
     let scene = ["--objects", "300", "--frames", "90", "--repeats", "1", "--json", "--record"];
     let recorded = answer(run("fragmentation", &tuning, &scene).arg(&stream));
@@ -58,8 +60,7 @@ fn a_recorded_scene_is_run_and_searched_like_the_scene() {
 
 #[test]
 fn a_run_compares_the_choice_over_all_frames_and_over_parts() {
-    let folder = tempfile::tempdir().unwrap();
-    let tuning = steps(folder.path(), "brute@cpu1", 60, "grid-sap@cpu1");
+    let (_folder, tuning) = steps(60);
     let words = ["--objects", "200", "--frames", "30", "--repeats", "2", "--after", "20,10,20", "--json"];
     let told = answer(&mut run("fragmentation", &tuning, &words));
     let parts = list(&told["parts"]);
@@ -111,8 +112,7 @@ fn without_tuning_it_is_predicted() {
 
 #[test]
 fn every_frame_is_traced_and_drawn() {
-    let folder = tempfile::tempdir().unwrap();
-    let tuning = steps(folder.path(), "brute@cpu1", 60, "grid-sap@cpu1");
+    let (folder, tuning) = steps(60);
     let file = |name: &str| folder.path().join(name);
     let words = ["--objects", "200", "--frames", "12", "--repeats", "2"];
     let both = |trace: &str, plot: &str| {
@@ -136,8 +136,7 @@ fn every_frame_is_traced_and_drawn() {
 
 #[test]
 fn what_can_not_be_run_is_refused_with_what_to_do() {
-    let folder = tempfile::tempdir().unwrap();
-    let tuning = steps(folder.path(), "brute@cpu1", 60, "grid-sap@cpu1");
+    let (folder, tuning) = steps(60);
     let good = [0.0_f32, 0.0, 0.0, 1.0, 1.0, 1.0];
     let nan = [f32::NAN; 6];
     let file = |name: &str, shape: &str, rows: &[[f32; 6]]| npy(folder.path(), name, "<f4", shape, rows.as_flattened());
@@ -178,8 +177,7 @@ fn what_can_not_be_run_is_refused_with_what_to_do() {
 #[test]
 fn an_interrupt_keeps_the_repeats_that_are_complete() {
     use std::io::Read;
-    let folder = tempfile::tempdir().unwrap();
-    let tuning = steps(folder.path(), "brute@cpu1", 60, "grid-sap@cpu1");
+    let (folder, tuning) = steps(60);
     let trace = folder.path().join("trace.csv");
     // More repeats than it lives for; the first is over in a hundredth of a second.
     let words = ["--objects", "30", "--frames", "40", "--repeats", "1000", "--seed", "3", "--json"];
@@ -212,8 +210,7 @@ fn an_interrupt_keeps_the_repeats_that_are_complete() {
 #[cfg(unix)]
 #[test]
 fn a_recording_that_was_made_before_the_interrupt_is_told() {
-    let folder = tempfile::tempdir().unwrap();
-    let tuning = steps(folder.path(), "brute@cpu1", 60, "grid-sap@cpu1");
+    let (folder, tuning) = steps(60);
     let recording = folder.path().join("r.npy");
     // The first repeat takes longer than it lives for.
     let words = ["--objects", "8000", "--frames", "300"];

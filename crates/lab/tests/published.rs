@@ -6,9 +6,9 @@ use sapwise_tune::hardware::{GpuParameterId, How, ParameterId};
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// The columns of Figure 9: the file, the card, CPU->GPU and GPU->CPU in MB/s, Internal GPU in GB/s, Memory Size in MB,
-/// Clock Rate in GHz, Nb of Processors and Nb of Cores. Then of the machine of section 5 that the card stands in: the
-/// name of the CPU, the number in the parentheses after it, and its GHz.
+/// The columns of Figure 9: the file, the card, CPU->GPU and GPU->CPU in MB/s, Internal GPU in GB/s, Memory Size in
+/// MB, Clock Rate in GHz, Nb of Processors and Nb of Cores. Then of the machine of section 5 that the card stands in:
+/// the name of the CPU, the number in the parentheses after it, and its GHz.
 type Printed = (&'static str, &'static str, [f64; 7], (&'static str, f64, f64));
 
 const FIGURE_9: [Printed; 3] = [

@@ -24,8 +24,8 @@ pub(crate) struct Measured {
     pub(crate) remarks: Vec<String>,
 }
 
-/// Looks for GPUs, measures those that are taken, at most a minute and a half for each, and adds their parameters to the
-/// hardware.
+/// Looks for GPUs, measures those that are taken, at most a minute and a half for each, and adds their parameters to
+/// the hardware.
 ///
 /// # Errors
 /// When no process can be started, or a GPU that was asked for by its number is not there.

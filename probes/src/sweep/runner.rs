@@ -29,7 +29,8 @@ pub(crate) struct Found {
     pub(crate) interrupted: bool,
 }
 
-/// Sweeps every scenario of a plan on a number of cores and on some GPUs, and calls `keep` after each one, so that nothing measured is lost.
+/// Sweeps every scenario of a plan on a number of cores and on some GPUs, and calls `keep` after each one, so that
+/// nothing measured is lost.
 ///
 /// # Errors
 /// When no process can be started. A scenario that crashes is a remark, not an error.

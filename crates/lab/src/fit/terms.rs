@@ -85,9 +85,10 @@ const PAIR: f64 = 8.0;
 /// Returns the components of a frame on GPUs: dispatches that wait for each other, the bytes that the kernels read and
 /// write for each box and for each pair, and the transfers.
 ///
-/// Dispatches and bytes are counted from the kernels, for 100 000 evenly spread boxes: each element of a buffer once for
-/// each kernel that touches it. A fit finds only by how much a dispatch or a byte of the method is more expensive than
-/// one that a hardware parameter was measured with. A card that was not measured is assumed to have the same ratios.
+/// Dispatches and bytes are counted from the kernels, for 100 000 evenly spread boxes: each element of a buffer once
+/// for each kernel that touches it. A fit finds only by how much a dispatch or a byte of the method is more expensive
+/// than one that a hardware parameter was measured with. A card that was not measured is assumed to have the same
+/// ratios.
 fn on_gpus(method: &str) -> Vec<Component> {
     use {Scale::*, Term::*};
     let (dispatches, of_box, of_pair) = match method {
