@@ -155,15 +155,15 @@ fn steps(tuning: &Tuning, terminal: Terminal, all: bool) -> String {
             tuning.crossovers.iter().find(|b| b.above == step.algorithm && b.objects as u32 == step.from_objects);
         let interval = match crossover.and_then(Crossover::interval) {
             Some(whole) if is_whole_slice(whole) && !all => continue,
-            Some(whole) if is_whole_slice(whole) => "anywhere: both cost about the same".to_owned(),
-            Some((low, high)) => format!("{} to {}", grouped(low.round() as u64), grouped(high.round() as u64)),
+            Some(whole) if is_whole_slice(whole) => " (anywhere: both cost about the same)".to_owned(),
+            Some((low, high)) => format!(" ({} to {})", grouped(low.round() as u64), grouped(high.round() as u64)),
             None => String::new(),
         };
-        let from = format!("  from {}", grouped(u64::from(step.from_objects)));
-        rows.push(vec![from, step.algorithm.to_string(), interval]);
+        let from = format!("  from {}{interval}", grouped(u64::from(step.from_objects)));
+        rows.push(vec![from, step.algorithm.to_string()]);
     }
     let told = |b: &Crossover| b.interval().is_some();
-    let with = if tuning.crossovers.iter().any(told) { ", with 90 % intervals" } else { "" };
+    let with = if tuning.crossovers.iter().any(told) { " (90 % intervals)" } else { "" };
     let head = format!("Fastest by number of objects in the scenario {}{with}", tuning.scenario);
     format!("{}\n{}", terminal.head(&head), columns(&rows))
 }

@@ -2,7 +2,7 @@
 //! machine.
 
 use sapwise::Registry;
-use sapwise::algorithm::Entry;
+use sapwise::algorithm::{Entry, Load};
 use sapwise_lab::data::{host, read_reports};
 use sapwise_lab::progress::Silent;
 use sapwise_lab::read_model;
@@ -81,5 +81,11 @@ fn the_built_in_model_predicts_for_every_report() {
         assert!(!trained || !prediction.extrapolated, "{path}: {:?}", prediction.warnings);
         // More cores than it has seen lie outside of its ranges.
         assert!(known || cores <= most_known || prediction.extrapolated, "{path}");
+        let (wider, extrapolated) = (prediction.wider.clone(), prediction.extrapolated);
+        let loads: Vec<Load> = (4..20).map(|k| Load::of_objects(1 << k)).collect();
+        for c in prediction.tuning("uniform", &loads).crossovers {
+            let unknown = extrapolated || wider.contains(&c.below) || wider.contains(&c.above);
+            assert_eq!(c.interval().is_none(), unknown, "{path}: {c:?}");
+        }
     }
 }

@@ -17,8 +17,10 @@ use std::sync::Arc;
 pub struct Prediction {
     /// One curve for each algorithm that could be predicted.
     pub costs: Vec<AlgorithmCost>,
-    /// Whether the machine or an algorithm lies outside the training.
+    /// Whether the machine lies outside the training. Then no crossover has an interval.
     pub extrapolated: bool,
+    /// Algorithms on more threads or GPUs than the model has seen. Their crossovers have no interval.
+    pub wider: Vec<AlgorithmId>,
     /// What was outside, missing or left out, in sentences.
     pub warnings: Vec<String>,
     /// Name of the model.
@@ -54,6 +56,7 @@ impl Model {
         let mut p = Prediction {
             costs: Vec::new(),
             extrapolated: false,
+            wider: Vec::new(),
             warnings: Vec::new(),
             model: self.name.clone(),
             ratios_90_ln: self.ratios_90_ln,
@@ -93,7 +96,8 @@ impl Model {
             };
             if backend.width() > method.max_threads {
                 let what = if backend.class() == BackendClass::Cpu { "threads" } else { "GPUs" };
-                p.outside([format!("{id}: the model has seen {} {what} at most", method.max_threads)]);
+                p.warnings.push(format!("{id}: the model has seen {} {what} at most", method.max_threads));
+                p.wider.push(id.clone());
             }
             if let Backend::Gpu(indices) = backend {
                 p.outside(method.unseen_kinds(id, hardware, indices));
@@ -169,8 +173,8 @@ impl Prediction {
     /// Returns the tuning, with `steps` and `crossovers` for the slice through `loads`, ascending by objects.
     ///
     /// The interval of a crossover is the range in which the ratio of the two costs is nearer to one than nine of ten
-    /// such ratios were to their prediction on held-out machines. There is none if fewer than two were held out, or
-    /// if the machine is extrapolated.
+    /// such ratios were to their prediction on held-out machines. There is none if fewer than two were held out, if
+    /// the machine is extrapolated, or beside an algorithm in `wider`.
     pub fn tuning(self, scenario: &str, loads: &[Load]) -> Tuning {
         let within = self.ratios_90_ln.filter(|_| !self.extrapolated);
         let spread = |_: usize, _: usize, _: &Load| within.unwrap_or(0.0) / NORMAL_90;
@@ -181,11 +185,12 @@ impl Prediction {
                  that near their prediction",
                 ln.exp()
             ),
-            None => {
-                tuning.crossovers.iter_mut().for_each(|c| (c.low, c.high) = (None, None));
-                NO_INTERVALS.to_owned()
-            }
+            None => NO_INTERVALS.to_owned(),
         };
+        let unknown = |id: &AlgorithmId| within.is_none() || self.wider.contains(id);
+        for c in tuning.crossovers.iter_mut().filter(|c| unknown(&c.below) || unknown(&c.above)) {
+            (c.low, c.high) = (None, None);
+        }
         tuning.model = Some(self.model);
         (tuning.extrapolated, tuning.warnings) = (self.extrapolated, self.warnings);
         tuning
