@@ -24,6 +24,10 @@ const WARY: f32 = 1.1;
 /// Cost of a try with too many pairs, in frames from scratch.
 const CROWDED: f32 = 2.0;
 
+/// Fewest frames by which a failed try is judged; missing ones count as promised. One jump of the scene would otherwise
+/// prevent the next try for a thousand frames.
+const FEWEST_TRIED: f32 = 4.0;
+
 /// Frames without kept pairs over which the memory of a failure falls to an e-th.
 const FORGETTING: f32 = 512.0;
 
@@ -78,15 +82,16 @@ impl Prices {
         }
     }
 
-    /// Forgets the costs of a box, and half the logarithm of their ratio: with a tenth of the boxes, keeping may take
+    /// Forgets the costs of a box, and half the logarithms of their ratio and of the last failure: with a tenth of the boxes, keeping may take
     /// twice as long beside finding from scratch. In `uniform` that swings between 50 and 3000 boxes, frames take 0.74
-    /// to 0.82 × the time with the whole ratio remembered. `widths`: initial positions of the thread counts with kept
+    /// to 0.82 × the time with all of it remembered. `widths`: initial positions of the thread counts with kept
     /// pairs and from scratch.
     pub(super) fn forget(&mut self, widths: [usize; 2]) {
         (self.frames, self.of_scratch, self.is_beside) = (0, MeanTime::default(), false);
         self.keepers.restart(widths[0]);
         self.searchers.restart(widths[1]);
         self.change_keeping(f64::sqrt);
+        self.failure.over = self.failure.over.sqrt();
     }
 
     /// Learns from a frame from scratch that costs `model` by the model.
@@ -150,8 +155,10 @@ impl Prices {
     pub(super) fn failed(&mut self, too_many: bool) {
         let (work, pace) = match self.kept {
             _ if too_many => (CROWDED * self.promised[1], Some(0.0)),
-            [sum, frames] if frames > 0.0 => (sum / frames, None),
-            _ => (self.promised[0], None),
+            [sum, frames] => {
+                let as_promised = (FEWEST_TRIED - frames.max(0.0)).max(0.0);
+                ((sum + as_promised * self.promised[0]) / frames.max(FEWEST_TRIED), None)
+            }
         };
         self.searchers.resume();
         if too_many {
@@ -280,6 +287,18 @@ mod tests {
         assert_eq!([0.1, 0.01].map(|pace| begins_at(&prices, pace)), [36; 2]);
         prices.fade(10_000);
         assert_eq!(begins_at(&prices, 0.1), 39);
+    }
+
+    #[test]
+    fn one_jump_of_the_scene_does_not_prevent_the_next_try() {
+        let mut prices = keeping();
+        prices.pays(Some(900.0), 600.0, 40.0);
+        prices.failed(false);
+        // Of four frames one did twenty times the promised work.
+        assert_eq!(begins_at(&prices, 0.1), 6);
+        prices.forget([0; 2]);
+        (0..10).for_each(|_| prices.add_scratch(Some(50.0), 40.0));
+        assert!(begins_at(&prices, 0.1) > 11);
     }
 
     #[test]
