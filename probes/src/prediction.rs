@@ -16,6 +16,7 @@ use sapwise_lab::sweep::loads;
 use sapwise_scenes::Scenario;
 use sapwise_tune::hardware::ParameterId;
 use sapwise_tune::{GpuIdentity, Hardware, Model};
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Sizes of the slice that the tuning shows, in quarters of a decade: from ten objects to a million.
@@ -131,12 +132,21 @@ pub(crate) fn of_report(
         let slice = Slice::of(arguments.scenario.unwrap_or(Scenario::Uniform))?;
         predict(model, &report.hardware, &taken, &slice, algorithms)?
     };
+    // The worst first: only the first is shown by default.
+    let mut warnings: Vec<String> =
+        doubts(report).into_iter().map(|doubt| format!("the report is doubtful: {doubt}")).collect();
     // A prediction does not depend on the timings of the report.
     if arguments.measured {
-        let stale = revisions::stale_in_report(report, &algorithms.registry(usable_cores()));
-        tuning.warnings.extend(stale.into_iter().map(|why| format!("the report is stale: {why}; probe again")));
+        let registry = algorithms.registry(usable_cores());
+        let stale = revisions::stale_in_report(report, &registry);
+        warnings.extend(stale.into_iter().map(|why| format!("the report is stale: {why}; probe again")));
+        let timed = |method: &str| report.algorithms.iter().any(|timed| timed.id.method() == method);
+        let ids = registry.available().into_iter().map(|entry| entry.id);
+        let untimed: BTreeSet<String> = ids.map(|id| id.method().to_owned()).filter(|method| !timed(method)).collect();
+        warnings
+            .extend(untimed.into_iter().map(|method| format!("{method}: left out, since the report has not timed it")));
     }
-    tuning.warnings.extend(doubts(report).into_iter().map(|doubt| format!("the report is doubtful: {doubt}")));
+    tuning.warnings.splice(0..0, warnings);
     Ok(tuning)
 }
 

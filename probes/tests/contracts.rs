@@ -84,6 +84,8 @@ fn a_measured_tuning_comes_from_the_report_alone() {
     let tuning = answer(&mut measured(&["--json"]));
     assert_tuning(&tuning, "measured");
     assert_eq!(tuning["model"], Value::Null);
+    let untimed = "pair-cache: left out, since the report has not timed it";
+    assert!(tuning["warnings"].as_array().unwrap().contains(&untimed.into()), "{tuning}");
     failure(&mut measured(&["--scenario", "gravity"]), 1, &["gravity", "it holds: "]);
 }
 
