@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Most boxes of a frame: a GPU has 31 bits for their numbers, and one for the owner.
 const MOST_OBJECTS: usize = 1 << 30;
 
-/// Most slabs that a GPU takes one after another. If so many don't suffice, the slabs overlap too much for more to
+/// Most slabs that a GPU takes one after another. If these do not suffice, the slabs overlap too much for more to
 /// help.
 const MOST_ROUNDS: usize = 64;
 

@@ -24,8 +24,8 @@ const WARY: f32 = 1.1;
 /// Cost of a try with too many pairs, in frames from scratch.
 const CROWDED: f32 = 2.0;
 
-/// Fewest frames by which a failed try is judged; missing ones count as promised. One jump of the scene would otherwise
-/// prevent the next try for a thousand frames.
+/// Fewest frames by which a failed try is judged; missing ones count as promised. One jump of the scene would
+/// otherwise prevent the next try for a thousand frames.
 const FEWEST_TRIED: f32 = 4.0;
 
 /// Frames without kept pairs over which the memory of a failure falls to an e-th.
@@ -82,10 +82,10 @@ impl Prices {
         }
     }
 
-    /// Forgets the costs of a box, and half the logarithms of their ratio and of the last failure: with a tenth of the boxes, keeping may take
-    /// twice as long beside finding from scratch. In `uniform` that swings between 50 and 3000 boxes, frames take 0.74
-    /// to 0.82 × the time with all of it remembered. `widths`: initial positions of the thread counts with kept
-    /// pairs and from scratch.
+    /// Forgets the costs of a box, and half the logarithms of their ratio and of the last failure: with a tenth of the
+    /// boxes, keeping may take twice as long beside finding from scratch. In `uniform` that swings between 50 and 3000
+    /// boxes, frames take 0.74 to 0.82 × the time with all of it remembered. `widths`: initial positions of the thread
+    /// counts with kept pairs and from scratch.
     pub(super) fn forget(&mut self, widths: [usize; 2]) {
         (self.frames, self.of_scratch, self.is_beside) = (0, MeanTime::default(), false);
         self.keepers.restart(widths[0]);
@@ -156,8 +156,9 @@ impl Prices {
         let (work, pace) = match self.kept {
             _ if too_many => (CROWDED * self.promised[1], Some(0.0)),
             [sum, frames] => {
-                let as_promised = (FEWEST_TRIED - frames.max(0.0)).max(0.0);
-                ((sum + as_promised * self.promised[0]) / frames.max(FEWEST_TRIED), None)
+                let counted = frames.max(0.0);
+                let judged = counted.max(FEWEST_TRIED);
+                ((sum + (judged - counted) * self.promised[0]) / judged, None)
             }
         };
         self.searchers.resume();

@@ -23,8 +23,8 @@ pub(super) struct Order {
     keys: Vec<u64>,
     len: usize,
     scratch: Vec<u64>,
-    /// For each shape of the [sorted](Self::sort) boxes, active ones first: the axes on which the boxes are oversized, one
-    /// bit each, and their places in the order.
+    /// For each shape of the [sorted](Self::sort) boxes, active ones first: the axes on which the boxes are oversized,
+    /// one bit each, and their places in the order.
     pub(super) shapes: Vec<(u32, Range<usize>)>,
     /// Code of the first active box of each leaf, ascending.
     pub(super) starts: Vec<u32>,
