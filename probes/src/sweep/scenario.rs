@@ -206,6 +206,8 @@ fn keep_racing(racers: &mut Vec<Racer>, standings: &mut Vec<Standing>) {
 mod tests {
     use super::*;
     use crate::algorithms::UserAlgorithm;
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
     fn request(scenario: &str, sizes: &[u32], seconds: f64) -> SweepRequest {
         let (scenario, schedule) = (scenario.to_owned(), Schedule::Ascent(sizes.to_vec()));
@@ -285,6 +287,24 @@ mod tests {
         assert!(raced.contains(&"mine@cpu1".to_owned()) && !raced.contains(&"huge@cpu1".to_owned()), "{raced:?}");
         assert_eq!(remarks.len(), 1, "{remarks:?}");
         assert!(remarks[0].starts_with("uniform: huge@cpu1 is left out: no memory for 3 nodes"), "{remarks:?}");
+    }
+
+    #[test]
+    fn incremental_algorithms_are_created_anew_for_each_point() {
+        let mut algorithms = Algorithms::default();
+        let made = ["brute", "pair-cache"].map(|method| {
+            let made = Arc::<AtomicUsize>::default();
+            let count = Arc::clone(&made);
+            let create = move || {
+                count.fetch_add(1, Relaxed);
+                Registry::with_cores(1).create(&format!("{method}@cpu1").parse().unwrap())
+            };
+            algorithms.add(UserAlgorithm::on_one_thread(&format!("my-{method}"), 1, create)).unwrap();
+            made
+        });
+        let (points, remarks) = swept(&request("uniform", &[10, 20, 40], 10.0), &algorithms);
+        assert_eq!(points.len(), 3, "{remarks:?}");
+        assert_eq!(made.map(|made| made.load(Relaxed)), [1, 1 + 3]);
     }
 
     #[test]
